@@ -1,0 +1,36 @@
+"""The project's commands: `nox` checks it, `nox -s bench` reproduces the tables."""
+
+import nox
+
+nox.options.default_venv_backend = "virtualenv"
+nox.options.sessions = ["lint", "types", "tests"]
+nox.options.reuse_existing_virtualenvs = True
+
+PACKAGES = ["parapoint", "baselines", "benchmarks", "reports"]
+
+
+def install(session: nox.Session) -> None:
+    session.install("-c", "constraints.txt", "-e", ".[bench,dev]")
+
+
+@nox.session
+def lint(session: nox.Session) -> None:
+    """Ruff, and the import contract."""
+    session.install("ruff>=0.9", "import-linter>=2.1")
+    session.run("ruff", "check", ".")
+    session.run("ruff", "format", "--check", ".")
+    session.run("lint-imports")
+
+
+@nox.session
+def types(session: nox.Session) -> None:
+    """Mypy, strict."""
+    install(session)
+    session.run("mypy")
+
+
+@nox.session
+def tests(session: nox.Session) -> None:
+    """The test suite: `nox -s tests -- -k cutting` runs a part of it."""
+    install(session)
+    session.run("pytest", *session.posargs)

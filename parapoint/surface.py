@@ -1,0 +1,206 @@
+"""Surfaces: triangle meshes and point clouds, validated once, with their topology."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import igl
+import numpy as np
+import numpy.typing as npt
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from parapoint.errors import InputError
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+
+
+def read_only(values: Any, dtype: type[np.generic], name: str, columns: int) -> npt.NDArray[Any]:
+    """A read-only C-contiguous copy of `values` as a finite (n, columns) array.
+
+    Raises:
+        InputError: `values` has another shape, is not numeric, or holds NaN or infinite entries.
+    """
+    try:
+        array = np.array(values, dtype=dtype, order="C")
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{name} must be numbers of shape (n, {columns}): {error}") from None
+    if array.ndim != 2 or array.shape[1] != columns:
+        raise InputError(f"{name} must have shape (n, {columns}), not {array.shape}")
+    if array.dtype.kind == "f" and not np.isfinite(array).all():
+        row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
+        raise InputError(f"{name} must be finite; row {row} is {array[row].tolist()}")
+    array.setflags(write=False)
+    return array
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A triangle mesh.
+
+    Attributes:
+        vertices: (V, 3) float64 positions, finite. Unreferenced and duplicate vertices are kept.
+        faces: (F, 3) int64 rows of `vertices`, at least one face.
+
+    Raises:
+        InputError: a shape, a value or an index is not as said.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+
+    def __post_init__(self) -> None:
+        vertices = read_only(self.vertices, np.float64, "vertices", 3)
+        faces = read_only(self.faces, np.int64, "faces", 3)
+        if len(faces) == 0:
+            raise InputError("a mesh needs at least one face; a point cloud may have none")
+        if faces.min() < 0 or faces.max() >= len(vertices):
+            row = int(np.flatnonzero(((faces < 0) | (faces >= len(vertices))).any(axis=1))[0])
+            raise InputError(
+                f"face {row} is {faces[row].tolist()}, "
+                f"but vertices run from 0 to {len(vertices) - 1}"
+            )
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "faces", faces)
+
+    @cached_property
+    def halfedges(self) -> IntArray:
+        """(3F, 2) directed edges; row 3f + k runs from corner k to corner k + 1 of face f."""
+        return np.stack([self.faces, np.roll(self.faces, -1, axis=1)], axis=2).reshape(-1, 2)
+
+    @cached_property
+    def _edge_table(self) -> tuple[IntArray, IntArray, IntArray]:
+        """Undirected edges (E, 2), the edge of each halfedge (3F,), faces at each edge (E,)."""
+        edges, edge_of_halfedge, count = np.unique(
+            np.sort(self.halfedges, axis=1), axis=0, return_inverse=True, return_counts=True
+        )
+        return edges, edge_of_halfedge.reshape(-1), count
+
+    @property
+    def edges(self) -> IntArray:
+        """(E, 2) undirected edges, smaller vertex first."""
+        return self._edge_table[0]
+
+    @property
+    def edge_of_halfedge(self) -> IntArray:
+        """(3F,) row of `edges` for each row of `halfedges`."""
+        return self._edge_table[1]
+
+    @property
+    def edge_face_count(self) -> IntArray:
+        """(E,) number of faces at each edge: 1 on the boundary, 2 inside."""
+        return self._edge_table[2]
+
+    @cached_property
+    def boundary_loops(self) -> list[IntArray]:
+        """Ordered vertices of each boundary loop, longest (in 3D length) first."""
+        loops = [np.asarray(loop, dtype=np.int64) for loop in igl.boundary_loop_all(self.faces)]
+
+        def length(loop: IntArray) -> float:
+            points = self.vertices[loop]
+            return float(np.linalg.norm(points - np.roll(points, -1, axis=0), axis=1).sum())
+
+        return sorted(loops, key=length, reverse=True)
+
+    @cached_property
+    def referenced(self) -> BoolArray:
+        """(V,) whether any face uses the vertex."""
+        mask = np.zeros(len(self.vertices), dtype=bool)
+        mask[self.faces] = True
+        return mask
+
+    @property
+    def euler_characteristic(self) -> int:
+        """Referenced vertices - edges + faces."""
+        return int(self.referenced.sum()) - len(self.edges) + len(self.faces)
+
+    @cached_property
+    def face_components(self) -> IntArray:
+        """(F,) connected component of each face; faces that share a vertex are connected."""
+        i, j = self.edges.T
+        size = len(self.vertices)
+        graph = sparse.coo_matrix((np.ones(len(i), dtype=bool), (i, j)), shape=(size, size))
+        _, label = csgraph.connected_components(graph, directed=False)
+        return (
+            np.unique(label[self.faces[:, 0]], return_inverse=True)[1].reshape(-1).astype(np.int64)
+        )
+
+    @property
+    def component_count(self) -> int:
+        """Number of connected components, unreferenced vertices apart."""
+        return int(self.face_components.max()) + 1
+
+    @cached_property
+    def is_manifold(self) -> bool:
+        """At most two faces at each edge, one fan of faces at each vertex, no vertex twice in one."""
+        repeated = (self.faces == np.roll(self.faces, 1, axis=1)).any()
+        if repeated or (self.edge_face_count > 2).any():
+            return False
+        return bool(
+            igl.is_vertex_manifold(self.faces)[self.referenced[: self.faces.max() + 1]].all()
+        )
+
+    @cached_property
+    def is_oriented(self) -> bool:
+        """No directed edge stands twice: neighbouring faces turn the same way."""
+        return len(np.unique(self.halfedges, axis=0)) == len(self.halfedges)
+
+    @property
+    def genus(self) -> int:
+        """Number of handles of a connected, manifold, oriented surface."""
+        return (2 - self.euler_characteristic - len(self.boundary_loops)) // 2
+
+    @cached_property
+    def topology(self) -> str:
+        """The topology in words: "disk", "sphere", "genus 0 with 11 boundary loops", ..."""
+        if not self.is_manifold:
+            return "not manifold"
+        if not self.is_oriented:
+            return "manifold, faces not consistently oriented"
+        if self.component_count > 1:
+            return f"{self.component_count} components"
+        loops = len(self.boundary_loops)
+        if self.genus == 0 and loops < 2:
+            return "disk" if loops else "sphere"
+        boundary = f"{loops} boundary loop{'s' * (loops != 1)}" if loops else "no boundary"
+        return f"genus {self.genus} with {boundary}"
+
+    @cached_property
+    def face_areas(self) -> FloatArray:
+        """(F,) triangle areas."""
+        a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
+        return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2, dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class PointCloud:
+    """Points on a surface.
+
+    Attributes:
+        points: (P, 3) float64 positions, finite, at least one.
+        normals: (P, 3) float64 normals, or None.
+
+    Raises:
+        InputError: a shape or a value is not as said.
+    """
+
+    points: FloatArray
+    normals: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        points = read_only(self.points, np.float64, "points", 3)
+        if len(points) == 0:
+            raise InputError("a point cloud needs at least one point")
+        object.__setattr__(self, "points", points)
+        if self.normals is not None:
+            normals = read_only(self.normals, np.float64, "normals", 3)
+            if len(normals) != len(points):
+                raise InputError(f"{len(normals)} normals for {len(points)} points")
+            object.__setattr__(self, "normals", normals)
+
+
+Surface = Mesh | PointCloud
