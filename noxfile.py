@@ -34,3 +34,23 @@ def tests(session: nox.Session) -> None:
     """The test suite: `nox -s tests -- -k cutting` runs a part of it."""
     install(session)
     session.run("pytest", *session.posargs)
+
+
+@nox.session
+def bench(session: nox.Session) -> None:
+    """Run a suite (default: paper) and write its report: `nox -s bench -- smoke`."""
+    install(session)
+    arguments = list(session.posargs)
+    if not arguments or arguments[0].startswith("-"):
+        arguments.insert(0, "paper")
+    if "--out" not in arguments:
+        arguments += ["--out", f"results/{arguments[0]}"]
+    session.run("python", "-m", "benchmarks", "run", *arguments)
+    session.run("python", "-m", "reports", arguments[arguments.index("--out") + 1])
+
+
+@nox.session
+def regress(session: nox.Session) -> None:
+    """Compare the metric values of every deterministic method with the golden ones."""
+    install(session)
+    session.run("python", "-m", "benchmarks.regress", *session.posargs)

@@ -1,0 +1,50 @@
+"""Every command ends with one clear line and exit status 2 on wrong use or input."""
+
+import subprocess
+import sys
+
+import click
+import pytest
+
+from parapoint import InputError, console
+
+
+def test_bad_input_is_one_line_and_status_two(capsys):
+    @click.command
+    def command():
+        raise InputError("model.obj: no faces;\nadd some")
+
+    with pytest.raises(SystemExit) as caught:
+        console.run(command, [])
+    assert caught.value.code == 2
+    assert capsys.readouterr() == ("", "error: model.obj: no faces; add some\n")
+
+
+def test_wrong_usage_is_one_line_and_status_two(capsys):
+    @click.command
+    @click.option("--number", type=int)
+    def command(number):
+        raise AssertionError(number)
+
+    with pytest.raises(SystemExit) as caught:
+        console.run(command, ["--number", "many"])
+    assert caught.value.code == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    assert "many" in err
+
+
+def test_a_bug_is_not_dressed_up_as_bad_input():
+    @click.command
+    def command():
+        raise ValueError("ours")
+
+    with pytest.raises(ValueError, match="ours"):
+        console.run(command, [])
+
+
+@pytest.mark.parametrize("module", ["parapoint", "baselines.registry", "benchmarks", "reports"])
+def test_light_imports_leave_torch_out(module):
+    code = f"import sys, {module}; sys.exit('torch' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
