@@ -1,12 +1,59 @@
-"""The result store of a run: rows, maps, surfaces, environment, metrics."""
+"""The result store of a run: rows, maps, surfaces, environment, metrics.
+
+A results folder holds
+
+    runs.jsonl             one line a cell, appended only, by the one process that holds the lock
+    uv/<id>.npz            the map of a cell, written before its line
+    surfaces/<hash>.npz    each surface as loaded
+    environment.json       the format version and one entry a run: commit, versions, machine
+    metrics.parquet        derived from the above, may be deleted at any time
+
+Nothing in it is ever overwritten but what is derived. File names are made of hashes alone, and no
+file is ever unpickled.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import contextlib
+import dataclasses
+import errno
+import hashlib
+import inspect
+import io
+import json
+import logging
+import math
+import os
+import re
+import sys
+import typing
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from parapoint.errors import InputError
+from parapoint.parameterization import Parameterization, PointParameterization, TracePoint
+from parapoint.surface import Mesh, PointCloud, Surface
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Status = Literal["ok", "skipped", "failed", "timeout", "out_of_memory"]
+Arrays = Mapping[str, npt.NDArray[Any]]
+
+FORMAT = 1
+"""Version of the folder's layout; a folder with a larger one is left alone."""
+
+IDENTITY_COLUMNS = ("suite", "case", "method", "params", "seed", "status")
+_NAME = re.compile(r"[0-9a-f]{8,64}")
+_log = logging.getLogger("parapoint")
 
 
 @dataclass(frozen=True)
@@ -21,17 +68,19 @@ class ResultRow:
         params: all hyperparameters of the method (its dataclass fields).
         seed: seed of the cell.
         source_hash: hash of the method's source.
-        surface_hash: hash of the surface as loaded; names `surfaces/<hash>.npz`.
+        surface_hash: hash of the surface as loaded; names `surfaces/<hash>.npz`. "" where the
+            model could not be had.
         status: how it ended.
         reason: why, unless ok: one line.
         output: last lines of what the method printed, kept where it did not end well.
         preprocessing: what was done to the surface before the method saw it ("" for nothing).
         seconds: wall time of `parameterize` alone.
-        cpu_seconds: processor time of the same.
-        peak_memory_mb: peak resident memory of the cell's process.
+        cpu_seconds: processor time of the same, all threads and ended child processes.
+        peak_memory_mb: peak resident memory of the cell's processes, in units of 10^6 bytes.
         uv_file: `uv/<id>.npz`, or "" where there is no map.
-        uv_sha256: hash of that file.
+        uv_sha256: `arrays_hash` of the map: the same map has the same hash, whatever its trace.
         report: what the method wrote beside its result (energies, iterations, weights).
+        run: entry of `environment()["runs"]` in which the cell ran.
     """
 
     id: str
@@ -52,3 +101,533 @@ class ResultRow:
     uv_file: str = ""
     uv_sha256: str = ""
     report: Mapping[str, object] = field(default_factory=dict)
+    run: int = 0
+
+    @property
+    def cell(self) -> str:
+        """What the row answers, whatever the versions: suite, case, method, params and seed."""
+        return json.dumps([self.suite, self.case, self.method, self.params, self.seed])
+
+
+def plain(value: object) -> Any:
+    """`value` as JSON can hold it: numpy to Python, numbers that are not finite to text."""
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if isinstance(value, float):
+        return value if math.isfinite(value) else str(value)
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, Mapping):
+        return {str(key): plain(entry) for key, entry in value.items()}
+    if isinstance(value, set | frozenset):
+        return sorted(plain(entry) for entry in value)
+    if isinstance(value, list | tuple):
+        return [plain(entry) for entry in value]
+    return str(value)
+
+
+def identity(
+    *,
+    suite: str,
+    case: str,
+    method: str,
+    params: Mapping[str, object],
+    seed: int,
+    source_hash: str,
+    surface_hash: str,
+) -> str:
+    """The id of a cell: 32 hexadecimal digits."""
+    parts = [suite, case, method, plain(params), seed, source_hash, surface_hash]
+    text = json.dumps(parts, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def arrays_hash(arrays: Arrays) -> str:
+    """64 hexadecimal digits over the names, shapes and values of `arrays`."""
+    digest = hashlib.sha256()
+    for name, array in sorted(arrays.items()):
+        digest.update(f"{name} {array.dtype.str} {array.shape} ".encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
+def surface_arrays(surface: Surface) -> dict[str, npt.NDArray[Any]]:
+    """The arrays that make up `surface`."""
+    if isinstance(surface, Mesh):
+        return {"vertices": surface.vertices, "faces": surface.faces}
+    if surface.normals is None:
+        return {"points": surface.points}
+    return {"points": surface.points, "normals": surface.normals}
+
+
+def map_arrays(result: Parameterization | PointParameterization) -> dict[str, npt.NDArray[Any]]:
+    """The arrays that make up the map itself, its trace apart."""
+    if isinstance(result, Parameterization):
+        return {"uv": result.uv, "corners": result.corners}
+    return {"uv": result.uv}
+
+
+def trace_arrays(trace: tuple[TracePoint, ...]) -> dict[str, npt.NDArray[Any]]:
+    """A trace as arrays: absent values are NaN, the map of point n is `trace_uv_<n>`."""
+    if not trace:
+        return {}
+    steps, seconds, terms, maps = zip(*trace, strict=True)
+    names = list(dict.fromkeys(name for term in terms for name in term))
+    values = [[float(term.get(name, math.nan)) for name in names] for term in terms]
+    arrays: dict[str, npt.NDArray[Any]] = {
+        "trace_iteration": np.array(steps, dtype=np.int64),
+        "trace_seconds": np.array(seconds, dtype=np.float64),
+        "trace_names": np.array(names, dtype=np.str_),
+        "trace_values": np.array(values, dtype=np.float64).reshape(len(trace), len(names)),
+    }
+    for n, uv in enumerate(maps):
+        if uv is not None:
+            arrays[f"trace_uv_{n}"] = np.asarray(uv, dtype=np.float64)
+    return arrays
+
+
+def _trace(arrays: Arrays) -> tuple[TracePoint, ...]:
+    """The trace that `trace_arrays` wrote."""
+    if "trace_iteration" not in arrays:
+        return ()
+    names = [str(name) for name in arrays["trace_names"]]
+    return tuple(
+        TracePoint(
+            int(iteration),
+            float(arrays["trace_seconds"][n]),
+            {
+                name: float(value)
+                for name, value in zip(names, arrays["trace_values"][n], strict=True)
+                if not math.isnan(value)
+            },
+            arrays.get(f"trace_uv_{n}"),
+        )
+        for n, iteration in enumerate(arrays["trace_iteration"])
+    )
+
+
+def write_arrays(path: Path, arrays: Arrays) -> None:
+    """Write `arrays` to the npz file `path`, all or nothing, and onto the disk."""
+    # Indices are most of a map's size, and 32 bits hold them: half the bytes to compress.
+    small = {
+        name: array.astype(np.int32)
+        if array.dtype == np.int64 and array.size and abs(array).max() < 2**31
+        else array
+        for name, array in arrays.items()
+    }
+    with _replacing(path) as stream:
+        np.savez_compressed(stream, allow_pickle=False, **small)
+
+
+def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
+    """The arrays of the npz file `path`; nothing in it is unpickled.
+
+    Raises:
+        InputError: the file is missing or damaged.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+    except FileNotFoundError:
+        raise InputError(f"{path}: missing") from None
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise InputError(f"{path}: damaged ({error})") from None
+    return {
+        name: array.astype(np.int64) if array.dtype == np.int32 else array
+        for name, array in arrays.items()
+    }
+
+
+@contextlib.contextmanager
+def _replacing(path: Path) -> Iterator[typing.IO[bytes]]:
+    """A stream whose content becomes the file `path`, in one step, when the block ends well."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with part.open("wb") as stream:
+            yield stream
+            stream.flush()
+            os.fsync(stream.fileno())
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+    _sync_folder(path.parent)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Put the names in `folder` onto the disk, where the system can."""
+    with contextlib.suppress(OSError, AttributeError):
+        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def _write_whole(stream: int, line: bytes) -> None:
+    """Write `line` in one write and put it onto the disk."""
+    if os.write(stream, line) != len(line):
+        raise OSError(errno.ENOSPC, "short write")
+    os.fsync(stream)
+
+
+@contextlib.contextmanager
+def _space_said(path: Path) -> Iterator[None]:
+    """Says a full disk in one clear line."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno in {errno.ENOSPC, errno.EDQUOT}:
+            raise InputError(
+                f"{path}: no space left on the disk; earlier results are intact: make room and "
+                "run the same command again"
+            ) from None
+        raise
+
+
+def _row(line: bytes) -> ResultRow | None:
+    """The row of a line of `runs.jsonl`, or None where the line is no whole row."""
+    try:
+        row = ResultRow(**json.loads(line))
+    except (ValueError, TypeError, RecursionError):
+        return None
+    named = isinstance(row.id, str) and isinstance(row.surface_hash, str)
+    if not named or not _NAME.fullmatch(row.id):
+        return None
+    if row.surface_hash and not _NAME.fullmatch(row.surface_hash):
+        return None
+    texts = (row.suite, row.case, row.method, row.source_hash, row.reason, row.uv_sha256)
+    typed = (
+        all(isinstance(text, str) for text in texts)
+        and row.status in typing.get_args(Status)
+        and isinstance(row.params, dict)
+        and isinstance(row.report, dict)
+        and isinstance(row.seed, int)
+        and isinstance(row.run, int)
+    )
+    return row if typed else None
+
+
+class Store:
+    """The results in a folder. Reading needs nothing; writing happens inside `writing()`.
+
+    Attributes:
+        folder: the results folder.
+    """
+
+    def __init__(self, folder: Path | str) -> None:
+        """The store in `folder`, which need not exist yet.
+
+        Raises:
+            InputError: `folder` is a file, or was written by a newer version.
+        """
+        self.folder = Path(folder)
+        self._stream: int | None = None
+        if self.folder.exists() and not self.folder.is_dir():
+            raise InputError(f"{self.folder} is a file; name a folder for the results")
+        version = self.environment().get("format", FORMAT)
+        if not isinstance(version, int) or version > FORMAT:
+            raise InputError(
+                f"{self.folder} was written by a newer version (results format {version}; this "
+                f"one reads up to {FORMAT}): update, or name another folder"
+            )
+
+    @property
+    def _runs(self) -> Path:
+        return self.folder / "runs.jsonl"
+
+    def _lines(self) -> list[bytes]:
+        """The lines of `runs.jsonl` that end: one that does not is torn, or being written."""
+        try:
+            return self._runs.read_bytes().split(b"\n")[:-1]
+        except FileNotFoundError:
+            return []
+
+    def history(self) -> list[ResultRow]:
+        """Every row ever written, oldest first; lines that are no row are left out and said."""
+        rows = [_row(line) for line in self._lines()]
+        bad = sum(row is None for row in rows)
+        if bad:
+            _log.warning("%s: %d damaged lines left out", self._runs, bad)
+        return [row for row in rows if row is not None]
+
+    def rows(self) -> list[ResultRow]:
+        """The latest row of each cell, in the order in which the cells first ran.
+
+        A row of an older source or surface gives way to the newer one of the same suite, case,
+        method, parameters and seed; `history()` has both.
+        """
+        return list({row.cell: row for row in self.history()}.values())
+
+    def environment(self) -> dict[str, Any]:
+        """`{"format": 1, "runs": [...]}`: one entry a run with commit, versions and machine.
+
+        Raises:
+            InputError: the file is damaged.
+        """
+        path = self.folder / "environment.json"
+        try:
+            content = json.loads(path.read_bytes())
+        except FileNotFoundError:
+            return {"format": FORMAT, "runs": []}
+        except (ValueError, RecursionError):
+            content = None
+        if not isinstance(content, dict) or not isinstance(content.get("runs"), list):
+            raise InputError(f"{path}: damaged; restore it, or name another folder")
+        return content
+
+    def surface(self, row: ResultRow) -> Surface:
+        """The surface of a row as it was loaded, before any preprocessing.
+
+        Raises:
+            InputError: the row has none, or its file is missing or damaged.
+        """
+        if not row.surface_hash:
+            raise InputError(f"{row.case}: no surface is stored ({row.reason})")
+        return read_surface(self.surface_path(row.surface_hash))
+
+    def result(self, row: ResultRow) -> Parameterization | PointParameterization:
+        """The map of an `ok` row, with its trace and report.
+
+        Raises:
+            InputError: the row has none, or its file is missing or damaged.
+        """
+        if not row.uv_sha256:
+            raise InputError(f"{row.case}, {row.method}: no map is stored ({row.status})")
+        path = self.uv_path(row.id)
+        arrays = read_arrays(path)
+        try:
+            trace = _trace(arrays)
+            if "corners" in arrays:
+                return Parameterization(arrays["uv"], arrays["corners"], trace, row.report)
+            return PointParameterization(arrays["uv"], trace, row.report)
+        except (InputError, KeyError, IndexError, ValueError, TypeError) as error:
+            raise InputError(f"{path}: damaged ({error})") from None
+
+    def metrics(self) -> pd.DataFrame:
+        """One row a cell: suite, case, method, params, seed, status, every metric by name, id.
+
+        `params` is a JSON string; a metric that does not apply is null. Computed from the stored
+        maps, only for what is missing in or has changed since `metrics.parquet`, which is updated.
+        """
+        import pandas as pd
+
+        names = _metric_names()
+        known = self._known_metrics()
+        source = _metrics_source()
+        records = []
+        added = False
+        for row in self.rows():
+            key = hashlib.sha256(f"{row.id} {row.uv_sha256} {source}".encode()).hexdigest()[:32]
+            if key in known:
+                values = known[key]
+            else:
+                values = self._measured(row)
+                added = True
+            cell = (row.suite, row.case, row.method, json.dumps(row.params), row.seed, row.status)
+            records.append(
+                dict(zip(IDENTITY_COLUMNS, cell, strict=True))
+                | values
+                | {"id": row.id, "metrics_key": key}
+            )
+        extra = {name for record in records for name in record}
+        extra -= {*IDENTITY_COLUMNS, *names, "id", "metrics_key"}
+        measured = [*names, *sorted(extra)]
+        columns = [*IDENTITY_COLUMNS, *measured, "id", "metrics_key"]
+        frame = pd.DataFrame.from_records(records, columns=columns)
+        frame = frame.astype(dict.fromkeys(measured, "float64") | {"seed": "int64"})
+        if added or len(known) != len(records):
+            self._write_metrics(frame)
+        return frame
+
+    def _write_metrics(self, frame: pd.DataFrame) -> None:
+        """Put `frame` into `metrics.parquet`; a folder that may only be read is left as it is."""
+        path = self.folder / "metrics.parquet"
+        content = io.BytesIO()
+        frame.to_parquet(content, index=False)
+        with contextlib.suppress(PermissionError), _space_said(path), _replacing(path) as stream:
+            stream.write(content.getbuffer())
+
+    def _known_metrics(self) -> dict[str, dict[str, float]]:
+        """The values in `metrics.parquet` by their key; none where it is missing or damaged."""
+        import pandas as pd
+        import pyarrow as pa
+
+        path = self.folder / "metrics.parquet"
+        try:
+            frame = pd.read_parquet(path)
+            values = frame.drop(columns=[*IDENTITY_COLUMNS, "id"]).set_index("metrics_key")
+        except FileNotFoundError:
+            return {}
+        except (OSError, ValueError, KeyError, pa.ArrowException):
+            _log.warning("%s: damaged; computed anew", path)
+            return {}
+        return {str(key): record for key, record in values.to_dict("index").items()}  # type: ignore[misc]
+
+    def _measured(self, row: ResultRow) -> dict[str, float]:
+        """Every metric of a row's map; none where it has no map or its files are damaged."""
+        if not row.uv_sha256:
+            return {}
+        from benchmarks import metrics
+
+        try:
+            surface = self.surface(row)
+            result = self.result(row)
+            if isinstance(surface, Mesh) and isinstance(result, Parameterization):
+                return dict(metrics.evaluate(surface, result))
+            if isinstance(surface, PointCloud) and isinstance(result, PointParameterization):
+                return dict(metrics.evaluate_points(surface, result))
+        except InputError as error:
+            _log.warning("%s, %s: no metrics: %s", row.case, row.method, error)
+            return {}
+        _log.warning("%s, %s: no metrics: the map is of another kind", row.case, row.method)
+        return {}
+
+    def surface_path(self, surface_hash: str) -> Path:
+        """Where the surface of that hash lies."""
+        return self.folder / "surfaces" / f"{surface_hash}.npz"
+
+    def uv_path(self, row_id: str) -> Path:
+        """Where the map of that row lies."""
+        return self.folder / "uv" / f"{row_id}.npz"
+
+    @contextlib.contextmanager
+    def writing(self) -> Iterator[None]:
+        """Holds the folder for this process alone, made if need be; a torn last line is set aside.
+
+        The lock is the system's own on an open file: it ends with its process, however that ends.
+
+        Raises:
+            InputError: another run holds the folder, or the disk is full.
+        """
+        import filelock
+
+        path = self.folder / "lock"
+        with _space_said(self.folder):
+            self.folder.mkdir(parents=True, exist_ok=True)
+            lock = filelock.FileLock(path, timeout=0)
+            try:
+                lock.acquire()
+            except filelock.Timeout:
+                raise InputError(
+                    f"{self.folder} is in use by another run; wait for it, or name another folder"
+                ) from None
+        try:
+            with _space_said(self._runs):
+                self._set_torn_line_aside()
+                self._stream = os.open(self._runs, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+            yield
+        finally:
+            if self._stream is not None:
+                os.close(self._stream)
+                self._stream = None
+            lock.release()
+
+    def _set_torn_line_aside(self) -> None:
+        """Move what follows the last whole row to `runs.torn`, and say so."""
+        if not self._runs.exists():
+            return
+        content = self._runs.read_bytes()
+        end = len(content)
+        while end and not (
+            content[end - 1 : end] == b"\n"
+            and _row(content[content.rfind(b"\n", 0, end - 1) + 1 : end - 1])
+        ):
+            end = content.rfind(b"\n", 0, end - 1) + 1
+        if end == len(content):
+            return
+        aside = self.folder / "runs.torn"
+        with aside.open("ab") as stream:
+            stream.write(content[end:] + b"\n")
+            stream.flush()
+            os.fsync(stream.fileno())
+        with self._runs.open("r+b") as stream:
+            stream.truncate(end)
+            os.fsync(stream.fileno())
+        _log.warning(
+            "%s: the last line was torn (%d bytes); it is set aside in %s and its cell runs again",
+            self._runs,
+            len(content) - end,
+            aside.name,
+        )
+
+    def append(self, row: ResultRow) -> None:
+        """Write a row at the end: one line, one write, onto the disk. All or nothing.
+
+        Raises:
+            InputError: the disk is full.
+        """
+        assert self._stream is not None, "append is for the process inside writing()"
+        record = plain({f.name: getattr(row, f.name) for f in dataclasses.fields(row)})
+        line = json.dumps(record).encode() + b"\n"
+        before = os.fstat(self._stream).st_size
+        with _space_said(self._runs):
+            try:
+                _write_whole(self._stream, line)
+            except OSError:
+                os.ftruncate(self._stream, before)
+                raise
+
+    def add_surface(self, surface: Surface) -> str:
+        """Store `surface` unless it is there; its hash."""
+        arrays = surface_arrays(surface)
+        name = arrays_hash(arrays)[:32]
+        path = self.surface_path(name)
+        with _space_said(path):
+            if not path.exists():
+                write_arrays(path, arrays)
+        return name
+
+    def add_run(self, entry: Mapping[str, object]) -> int:
+        """Add an entry to `environment.json`; its number."""
+        content = self.environment()
+        content["runs"].append(plain(entry))
+        path = self.folder / "environment.json"
+        with _space_said(path), _replacing(path) as stream:
+            stream.write(json.dumps(content, indent=1).encode() + b"\n")
+        return len(content["runs"]) - 1
+
+
+def read_surface(path: Path) -> Surface:
+    """The surface in a file of the store.
+
+    Raises:
+        InputError: the file is missing or damaged.
+    """
+    arrays = read_arrays(path)
+    try:
+        if "faces" in arrays:
+            return Mesh(arrays["vertices"], arrays["faces"])
+        return PointCloud(arrays["points"], arrays.get("normals"))
+    except (InputError, KeyError) as error:
+        raise InputError(f"{path}: damaged ({error})") from None
+
+
+def _metric_names() -> list[str]:
+    """Names of all metrics in the order of the registry."""
+    from benchmarks.metrics import METRICS
+
+    return list(METRICS)
+
+
+def _metrics_source() -> str:
+    """Hash of the source that the metrics are computed with: their modules of this project."""
+    from benchmarks import metrics
+
+    found: dict[str, ModuleType] = {}
+    pending: list[ModuleType] = [metrics]
+    while pending:
+        module = pending.pop()
+        if module.__name__ in found:
+            continue
+        found[module.__name__] = module
+        for value in vars(module).values():
+            name = getattr(value, "__module__", None) or getattr(value, "__name__", "")
+            if isinstance(name, str) and name.split(".")[0] in {"benchmarks", "parapoint"}:
+                other = sys.modules.get(name)
+                if other is not None:
+                    pending.append(other)
+    digest = hashlib.sha256()
+    for _, module in sorted(found.items()):
+        digest.update(inspect.getsource(module).encode())
+    return digest.hexdigest()
