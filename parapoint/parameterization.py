@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from parapoint.errors import InputError
-from parapoint.surface import FloatArray, IntArray, Mesh, read_only
+from parapoint.surface import FloatArray, IntArray, Mesh, edge_table, read_only
 
 
 class TracePoint(NamedTuple):
@@ -58,20 +59,44 @@ class Parameterization:
         object.__setattr__(self, "uv", uv)
         object.__setattr__(self, "corners", corners)
 
-    def charts(self) -> IntArray:
-        """(F,) the chart of each face: faces that share a UV edge (two rows of `uv`) are in one."""
-        halfedges = np.stack([self.corners, np.roll(self.corners, -1, axis=1)], axis=2).reshape(
-            -1, 2
-        )
-        _, edge = np.unique(np.sort(halfedges, axis=1), axis=0, return_inverse=True)
+    @cached_property
+    def _edge_table(self) -> tuple[IntArray, IntArray, IntArray]:
+        """UV edges (E, 2), the edge of each halfedge (3F,), halfedges at each edge (E,)."""
+        return edge_table(self.corners)
+
+    @property
+    def edges(self) -> IntArray:
+        """(E, 2) undirected UV edges: pairs of rows of `uv`, smaller row first."""
+        return self._edge_table[0]
+
+    @property
+    def edge_of_halfedge(self) -> IntArray:
+        """(3F,) row of `edges` for each halfedge, ordered as `Mesh.halfedges`."""
+        return self._edge_table[1]
+
+    @property
+    def edge_face_count(self) -> IntArray:
+        """(E,) number of faces at each UV edge: 1 on the boundary of a chart, 2 inside."""
+        return self._edge_table[2]
+
+    @cached_property
+    def _charts(self) -> IntArray:
         face = np.repeat(np.arange(len(self.corners)), 3)
-        count = len(self.corners)
-        at = sparse.coo_matrix(
-            (np.ones(3 * count, dtype=np.int64), (face, edge.reshape(-1)))
-        ).tocsr()
-        return np.asarray(
-            csgraph.connected_components(at @ at.T, directed=False)[1], dtype=np.int64
+        # Faces and their edges as one graph: a path between two faces runs through shared edges.
+        size = len(self.corners) + len(self.edges)
+        graph = sparse.coo_matrix(
+            (np.ones(len(face), dtype=bool), (face, len(self.corners) + self.edge_of_halfedge)),
+            shape=(size, size),
         )
+        label = csgraph.connected_components(graph, directed=False)[1][: len(self.corners)]
+        return np.asarray(label, dtype=np.int64)
+
+    def charts(self) -> IntArray:
+        """(F,) the chart of each face: faces that share a UV edge (two rows of `uv`) are in one.
+
+        Charts are numbered from 0 in the order of their first faces.
+        """
+        return self._charts
 
     def seams(self, mesh: Mesh) -> IntArray:
         """(S, 2) interior edges of `mesh` along which the map is cut, smaller vertex first.

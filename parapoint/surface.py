@@ -38,6 +38,28 @@ def read_only(values: Any, dtype: type[np.generic], name: str, columns: int) -> 
     return array
 
 
+def edge_table(triangles: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+    """The undirected edges of triangles, whose corners are any non-negative integers.
+
+    Args:
+        triangles: (F, 3); halfedge 3f + k runs from corner k to corner k + 1 of triangle f.
+
+    Returns:
+        Edges (E, 2), smaller end first, in lexicographic order; the edge of each halfedge (3F,);
+        the number of halfedges at each edge (E,).
+    """
+    start, end = triangles.reshape(-1), np.roll(triangles, -1, axis=1).reshape(-1)
+    # One integer an edge sorts ten times as fast as rows of two do.
+    base = int(triangles.max(initial=0)) + 1
+    key, edge_of_halfedge, count = np.unique(
+        np.minimum(start, end) * base + np.maximum(start, end),
+        return_inverse=True,
+        return_counts=True,
+    )
+    edges = np.stack(np.divmod(key, base), axis=1)
+    return edges, edge_of_halfedge.reshape(-1).astype(np.int64), count.astype(np.int64)
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """A triangle mesh.
@@ -75,10 +97,7 @@ class Mesh:
     @cached_property
     def _edge_table(self) -> tuple[IntArray, IntArray, IntArray]:
         """Undirected edges (E, 2), the edge of each halfedge (3F,), faces at each edge (E,)."""
-        edges, edge_of_halfedge, count = np.unique(
-            np.sort(self.halfedges, axis=1), axis=0, return_inverse=True, return_counts=True
-        )
-        return edges, edge_of_halfedge.reshape(-1), count
+        return edge_table(self.faces)
 
     @property
     def edges(self) -> IntArray:
