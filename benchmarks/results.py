@@ -106,7 +106,8 @@ class ResultRow:
     @property
     def cell(self) -> str:
         """What the row answers, whatever the versions: suite, case, method, params and seed."""
-        return json.dumps([self.suite, self.case, self.method, self.params, self.seed])
+        parts = [self.suite, self.case, self.method, plain(self.params), self.seed]
+        return json.dumps(parts, sort_keys=True)
 
 
 def plain(value: object) -> Any:
@@ -272,7 +273,7 @@ def _write_whole(stream: int, line: bytes) -> None:
 
 
 @contextlib.contextmanager
-def _space_said(path: Path) -> Iterator[None]:
+def disk_said(path: Path) -> Iterator[None]:
     """Says a full disk in one clear line."""
     try:
         yield
@@ -418,7 +419,7 @@ class Store:
         records = []
         added = False
         for row in self.rows():
-            key = hashlib.sha256(f"{row.id} {row.uv_sha256} {source}".encode()).hexdigest()[:32]
+            key = _metrics_key(row, source)
             if key in known:
                 values = known[key]
             else:
@@ -445,8 +446,70 @@ class Store:
         path = self.folder / "metrics.parquet"
         content = io.BytesIO()
         frame.to_parquet(content, index=False)
-        with contextlib.suppress(PermissionError), _space_said(path), _replacing(path) as stream:
+        with contextlib.suppress(PermissionError), disk_said(path), _replacing(path) as stream:
             stream.write(content.getbuffer())
+
+    def faults(self, sample: int = 20) -> Iterator[str]:
+        """What is wrong in the folder, one line each.
+
+        Every row against its files: hashes, shapes, finite values. Of `metrics.parquet`, `sample`
+        rows spread evenly are computed anew.
+        """
+        for number, line in enumerate(self._lines(), start=1):
+            if _row(line) is None:
+                yield f"runs.jsonl, line {number}: no whole row"
+        rows = self.rows()
+        sizes: dict[str, int] = {}
+        for surface_hash in dict.fromkeys(row.surface_hash for row in rows if row.surface_hash):
+            try:
+                surface = read_surface(self.surface_path(surface_hash))
+            except InputError as error:
+                yield str(error)
+                continue
+            if arrays_hash(surface_arrays(surface))[: len(surface_hash)] != surface_hash:
+                yield f"{self.surface_path(surface_hash)}: its content does not fit its name"
+            sizes[surface_hash] = len(
+                surface.faces if isinstance(surface, Mesh) else surface.points
+            )
+        for row in rows:
+            for fault in self._row_faults(row, sizes.get(row.surface_hash)):
+                yield f"{row.case}, {row.method}, seed {row.seed} ({row.id}): {fault}"
+        yield from self._metric_faults(rows, sample)
+
+    def _row_faults(self, row: ResultRow, size: int | None) -> Iterator[str]:
+        """What is wrong with a row whose surface has `size` faces, or points."""
+        names = ("suite", "case", "method", "params", "seed", "source_hash", "surface_hash")
+        if row.id != identity(**{name: getattr(row, name) for name in names}):
+            yield "its id is not that of its contents"
+        if row.status != "ok":
+            return
+        try:
+            result = self.result(row)
+        except InputError as error:
+            yield str(error)
+            return
+        if arrays_hash(map_arrays(result)) != row.uv_sha256:
+            yield f"{row.uv_file} is not the map that was written"
+        found = len(result.corners if isinstance(result, Parameterization) else result.uv)
+        if size is not None and found != size:
+            yield f"{row.uv_file} has {found} rows for {size} faces or points"
+
+    def _metric_faults(self, rows: list[ResultRow], sample: int) -> Iterator[str]:
+        """Where `metrics.parquet` differs from what `sample` of the maps give."""
+        known = self._known_metrics()
+        source = _metrics_source()
+        keys = {row.id: _metrics_key(row, source) for row in rows}
+        measured = [row for row in rows if row.status == "ok" and keys[row.id] in known]
+        for row in measured[:: max(1, len(measured) // sample)][:sample]:
+            stored = known[keys[row.id]]
+            for name, value in self._measured(row).items():
+                if not math.isclose(value, stored.get(name, math.nan), rel_tol=1e-9):
+                    if math.isnan(value) and math.isnan(stored.get(name, math.nan)):
+                        continue
+                    yield (
+                        f"{row.case}, {row.method}, seed {row.seed} ({row.id}): {name} is "
+                        f"{stored.get(name)} in metrics.parquet, {value} from the map"
+                    )
 
     def _known_metrics(self) -> dict[str, dict[str, float]]:
         """The values in `metrics.parquet` by their key; none where it is missing or damaged."""
@@ -503,7 +566,7 @@ class Store:
         import filelock
 
         path = self.folder / "lock"
-        with _space_said(self.folder):
+        with disk_said(self.folder):
             self.folder.mkdir(parents=True, exist_ok=True)
             lock = filelock.FileLock(path, timeout=0)
             try:
@@ -513,7 +576,7 @@ class Store:
                     f"{self.folder} is in use by another run; wait for it, or name another folder"
                 ) from None
         try:
-            with _space_said(self._runs):
+            with disk_said(self._runs):
                 self._set_torn_line_aside()
                 self._stream = os.open(self._runs, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
             yield
@@ -561,7 +624,7 @@ class Store:
         record = plain({f.name: getattr(row, f.name) for f in dataclasses.fields(row)})
         line = json.dumps(record).encode() + b"\n"
         before = os.fstat(self._stream).st_size
-        with _space_said(self._runs):
+        with disk_said(self._runs):
             try:
                 _write_whole(self._stream, line)
             except OSError:
@@ -573,17 +636,25 @@ class Store:
         arrays = surface_arrays(surface)
         name = arrays_hash(arrays)[:32]
         path = self.surface_path(name)
-        with _space_said(path):
+        with disk_said(path):
             if not path.exists():
                 write_arrays(path, arrays)
         return name
+
+    def add_map(self, row_id: str, path: Path) -> None:
+        """Take over the map file `path`, which lies on the same disk, for the row `row_id`."""
+        target = self.uv_path(row_id)
+        with disk_said(target):
+            target.parent.mkdir(exist_ok=True)
+            path.replace(target)
+        _sync_folder(target.parent)
 
     def add_run(self, entry: Mapping[str, object]) -> int:
         """Add an entry to `environment.json`; its number."""
         content = self.environment()
         content["runs"].append(plain(entry))
         path = self.folder / "environment.json"
-        with _space_said(path), _replacing(path) as stream:
+        with disk_said(path), _replacing(path) as stream:
             stream.write(json.dumps(content, indent=1).encode() + b"\n")
         return len(content["runs"]) - 1
 
@@ -601,6 +672,11 @@ def read_surface(path: Path) -> Surface:
         return PointCloud(arrays["points"], arrays.get("normals"))
     except (InputError, KeyError) as error:
         raise InputError(f"{path}: damaged ({error})") from None
+
+
+def _metrics_key(row: ResultRow, source: str) -> str:
+    """What the metrics of a row depend on, as a hash: its map, and the source of the metrics."""
+    return hashlib.sha256(f"{row.id} {row.uv_sha256} {source}".encode()).hexdigest()[:32]
 
 
 def _metric_names() -> list[str]:

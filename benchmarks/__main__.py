@@ -1,0 +1,183 @@
+"""`python -m benchmarks run | score | list | check`: the benchmark's commands."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from parapoint import console
+from parapoint.errors import InputError
+
+if TYPE_CHECKING:
+    from benchmarks.runner import Summary
+    from benchmarks.suites import Suite
+
+SUITE = "paper"
+"""What `run` runs if nothing is named."""
+ELSEWHERE = {"ignore_unknown_options": True, "help_option_names": []}
+"""Settings of a command whose options are read by a module that is imported only to run it."""
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+def main() -> None:
+    """Compare parameterization methods on real models, and score UV maps."""
+    logging.basicConfig(format="%(message)s")
+
+
+def split(text: str) -> list[str]:
+    """The parts of a list with commas between them; those inside brackets and quotes belong to one.
+
+    Raises:
+        InputError: a bracket or a quote is not closed, or a part is empty.
+    """
+    parts = [""]
+    quote, depth = "", 0
+    for letter in text:
+        if quote:
+            quote = "" if letter == quote else quote
+        elif letter in "\"'":
+            quote = letter
+        else:
+            depth += (letter in "([{") - (letter in ")]}")
+        if letter == "," and not quote and not depth:
+            parts.append("")
+        else:
+            parts[-1] += letter
+    parts = [part.strip() for part in parts]
+    if quote or depth or not all(parts):
+        raise InputError(f"{text!r} is no list such as a,b or a,b(x=1,y=2)")
+    return parts
+
+
+def _list(_: click.Context, __: click.Parameter, text: str | None) -> list[str] | None:
+    """An option that is a list."""
+    return None if text is None else split(text)
+
+
+def _seeds(_: click.Context, __: click.Parameter, text: str | None) -> list[int] | None:
+    """An option that is a list of seeds."""
+    if text is None:
+        return None
+    if not all(part.isascii() and part.isdigit() for part in split(text)):
+        raise InputError(f"seeds are whole numbers from 0, such as 0,1,2; not {text!r}")
+    return [int(part) for part in split(text)]
+
+
+@main.command()
+@click.argument("suite", required=False)
+@click.option("--methods", callback=_list, help="Such as slim,tutte or 'slim(iterations=1),lscm'.")
+@click.option("--cases", callback=_list, help="Names of models, or paths of files of your own.")
+@click.option("--seeds", callback=_seeds, help="Such as 0,1,2.")
+@click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Cells at once.")
+@click.option(
+    "--timeout",
+    type=click.FloatRange(0, min_open=True),
+    default=1800,
+    show_default=True,
+    help="Seconds a cell may take.",
+)
+@click.option(
+    "--memory",
+    type=click.FloatRange(0, min_open=True),
+    help="GB a cell may hold.  [default: four fifths of the machine's, / jobs]",
+)
+@click.option("--out", type=click.Path(path_type=Path), default="results", show_default=True)
+@click.option(
+    "--plugin", "plugins", multiple=True, metavar="FILE.py:Class", help="A method to add."
+)
+@click.option("--strict", is_flag=True, help="Exit with 1 if a cell did not end well.")
+@click.pass_context
+def run(
+    ctx: click.Context,
+    /,
+    suite: str | None,
+    cases: list[str] | None,
+    out: Path,
+    *,
+    strict: bool,
+    **options: Any,
+) -> None:
+    """Run the cells of SUITE (default: paper) that the results folder lacks.
+
+    A second run goes on where the first one ended. Results of all runs stay in the folder.
+    """
+    from benchmarks import suites
+    from benchmarks.display import BAD
+
+    if suite is None and cases is not None:
+        chosen = suites.Suite(
+            "custom", "cases of the command line", tuple(cases), suites.suite(SUITE).methods, (0,)
+        )
+    else:
+        chosen = suites.suite(suite or SUITE)
+    summary = _shown_run(chosen, out, cases=cases, **options)
+    rows = summary.rows
+    if cases is None and chosen.cases and len(summary.missing) == len(summary.suite.cases):
+        print(
+            f"\nNo model of {chosen.name} could be had (each is named above, with how to get it)."
+            "\nThe built-in surfaces run in their place.\n"
+        )
+        rows = [*rows, *_shown_run(suites.suite("builtin"), out, **options).rows]
+    print(f"results: {out}   report: python -m reports {out}")
+    if strict and any(row.status in BAD for row in rows):
+        ctx.exit(1)
+
+
+def _shown_run(suite: Suite, out: Path, **options: Any) -> Summary:
+    """Run a suite in view of the user."""
+    from benchmarks import runner
+    from benchmarks.display import Display, print_summary
+
+    with Display() as progress:
+        summary = runner.run(suite, out, progress=progress, **options)
+    print_summary(summary)
+    return summary
+
+
+@main.command("list")
+@click.argument("what", type=click.Choice(["suites", "cases", "methods", "metrics"]))
+def list_(what: str) -> None:
+    """Show what there is."""
+    from benchmarks.display import print_table
+    from benchmarks.listing import LISTS
+
+    print_table(LISTS[what]())
+
+
+@main.command()
+@click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
+@click.pass_context
+def check(ctx: click.Context, folder: Path) -> None:
+    """Verify every row of a results folder against its files, and a sample of its metrics."""
+    from benchmarks.results import Store
+
+    if not (folder / "runs.jsonl").is_file():
+        raise InputError(f"{folder} is no results folder: it has no runs.jsonl")
+    store = Store(folder)
+    faults = 0
+    for fault in store.faults():
+        faults += 1
+        print(fault)
+    rows = store.rows()
+    maps = sum(row.status == "ok" for row in rows)
+    print(f"{len(rows)} cells, {maps} maps: {faults or 'no'} fault{'s' * (faults != 1)}")
+    if faults:
+        ctx.exit(1)
+
+
+@main.command(context_settings=ELSEWHERE, add_help_option=False)
+@click.argument("arguments", nargs=-1, type=click.UNPROCESSED)
+@click.pass_context
+def score(ctx: click.Context, arguments: tuple[str, ...]) -> None:
+    """Every metric of an existing UV map."""
+    from benchmarks.score import score as command
+
+    with command.make_context(f"{ctx.command_path}", list(arguments), parent=ctx.parent) as inner:
+        command.invoke(inner)
+
+
+if __name__ == "__main__":
+    console.run(main)

@@ -1,0 +1,349 @@
+"""One cell of a run: a process of its own, under a time limit and a memory limit.
+
+`python -m benchmarks.worker FD` is a supervisor. It has the slow imports behind it, takes cells as
+JSON lines on standard input, runs each in a child process that it watches, and answers with one
+JSON line each on file descriptor FD. On Linux the child is a fork, which costs milliseconds; the
+supervisor only imports and never computes, so that no thread exists which a fork could lose.
+Elsewhere, where forking after such imports is not safe, the child is a fresh interpreter.
+
+What a method may do, it does to its own cell: the child has its own session, its own empty working
+folder, and a result pipe that ends with it. At a limit all its descendants are killed, those that
+left its process group as well (on Linux they fall to the supervisor as subreaper). If the
+supervisor's parent dies, so do they.
+
+Memory is the resident memory of the whole process tree, polled: a limit on address space would
+refuse what torch and CUDA only reserve. A method may thus exceed the limit for the length of a
+poll.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import faulthandler
+import json
+import os
+import random
+import resource
+import select
+import signal
+import subprocess
+import sys
+import time
+import traceback
+from pathlib import Path
+from typing import Any, Never
+
+import igl  # noqa: F401  imported before the forks, so that no cell pays for it
+import numpy as np
+import psutil
+import scipy.sparse.linalg  # noqa: F401  as above
+
+from baselines import registry
+from benchmarks.results import arrays_hash, map_arrays, plain, read_surface, trace_arrays
+from benchmarks.results import write_arrays as write_map
+from parapoint.method import UnsupportedError, prepared
+from parapoint.parameterization import Parameterization, PointParameterization
+from parapoint.surface import Mesh, Surface
+
+POLL = 0.05
+"""Seconds between two looks at the memory of the method's process."""
+TREE_POLL = 0.5
+"""Seconds between two looks at its descendants, which cost some milliseconds to find."""
+LARGEST_MESSAGE = 1 << 20
+"""Bytes of the longest outcome a cell may send, its report included."""
+PR_SET_PDEATHSIG = 1
+PR_SET_CHILD_SUBREAPER = 36
+FORKS = sys.platform == "linux"
+
+Outcome = dict[str, Any]
+
+
+def main() -> None:
+    """Supervise cells until standard input ends."""
+    reply = int(sys.argv[1])
+    os.set_inheritable(reply, False)
+    if FORKS:
+        ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    wake, waker = os.pipe()
+    os.set_blocking(wake, False)
+    os.set_blocking(waker, False)
+    signal.signal(signal.SIGCHLD, lambda *_: None)  # a handler is what makes the wake-up write
+    signal.set_wakeup_fd(waker, warn_on_full_buffer=False)
+    jobs = os.fdopen(os.dup(0), "rb", buffering=0)
+    os.write(reply, b'{"status": "ready"}\n')
+    while line := jobs.readline():
+        outcome = _supervised(json.loads(line), wake, [reply, wake, waker, jobs.fileno()])
+        os.write(reply, json.dumps(outcome).encode() + b"\n")
+
+
+def _supervised(job: dict[str, Any], wake: int, private: list[int]) -> Outcome:
+    """Run one cell in a child to its end or its limit, and leave nothing of it behind."""
+    kills = _system_kills()
+    deadline = time.monotonic() + job["time_limit"]
+    next_tree = time.monotonic() + TREE_POLL
+    result, send = os.pipe()
+    child = _start(job, send, [*private, result])
+    os.close(send)
+    os.set_blocking(result, False)
+    message = bytearray()
+    verdict: Outcome | None = None
+    peak = others = 0
+    watched = [0, wake, result]
+    while True:
+        ready, _, _ = select.select(watched, [], [], POLL)
+        if 0 in ready:  # jobs come one at a time, so this is the end of input: the runner is gone
+            _bury(child)
+            os._exit(1)
+        if wake in ready:
+            os.read(wake, 4096)
+        if result in ready:
+            chunk = os.read(result, 1 << 16)
+            message += chunk
+            if not chunk:
+                watched.remove(result)
+        ended, status, usage = os.wait4(child, os.WNOHANG)
+        if ended:
+            break
+        now = time.monotonic()
+        if now >= next_tree:
+            others = sum(_resident(process) for process in _descendants() if process.pid != child)
+            next_tree = now + TREE_POLL
+        memory = _resident(psutil.Process(child)) + others
+        peak = max(peak, memory)
+        if verdict is None and memory > job["memory_limit"]:
+            limit = job["memory_limit"] / 1e6
+            reason = f"used {memory / 1e6:.0f} MB of memory; the limit is {limit:.0f} MB"
+            verdict = {"status": "out_of_memory", "reason": reason}
+        elif verdict is None and now > deadline:
+            reason = f"not done within the limit of {job['time_limit']:g} s"
+            verdict = {"status": "timeout", "reason": reason}
+        if verdict is not None:
+            _kill(child)
+    message += _available(result)
+    os.close(result)
+    _bury(child)
+    outcome = verdict or _message(message) or _death(status, _system_kills() > kills)
+    unit = 1 if sys.platform == "darwin" else 1024  # of ru_maxrss, in bytes
+    return outcome | {"peak_memory_mb": max(peak, usage.ru_maxrss * unit) / 1e6}
+
+
+def _start(job: dict[str, Any], send: int, private: list[int]) -> int:
+    """Start the child of a cell, which answers on `send`; its process id."""
+    if not FORKS:
+        process = subprocess.Popen(  # noqa: S603  our own module
+            [sys.executable, "-c", f"from benchmarks import worker; worker.cell({send})"],
+            stdin=subprocess.PIPE,
+            start_new_session=True,
+            pass_fds=[send],
+        )
+        assert process.stdin is not None
+        process.stdin.write(json.dumps(job).encode())
+        process.stdin.close()
+        return process.pid
+    supervisor = os.getpid()
+    child = os.fork()
+    if child:
+        return child
+    try:
+        signal.set_wakeup_fd(-1)
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+        os.setsid()
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+        if os.getppid() != supervisor:
+            os._exit(1)
+        for descriptor in private:
+            os.close(descriptor)
+        _perform(job, send)
+    finally:
+        os._exit(1)
+
+
+def cell(send: int) -> Never:
+    """The child as a fresh interpreter: the job comes on standard input."""
+    _perform(json.loads(sys.stdin.buffer.read()), send)
+
+
+def _perform(job: dict[str, Any], send: int) -> Never:
+    """Run a cell in this process, send its outcome, and end."""
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    with contextlib.suppress(OSError):  # short of memory, the system ends this process first
+        Path("/proc/self/oom_score_adj").write_text("1000")
+    faulthandler.enable(file=2, all_threads=False)
+    os.chdir(job["work"])
+    os.environ["TMPDIR"] = job["work"]
+    random.seed(job["seed"])
+    np.random.seed(job["seed"] % 2**32)  # noqa: NPY002  for methods that draw from the global one
+    try:
+        outcome = _outcome(job)
+    except BaseException as error:  # noqa: BLE001  whatever a method raises is a row
+        traceback.print_exc()
+        outcome = _failure(error)
+    with contextlib.suppress(OSError, ValueError):
+        sys.stdout.flush()
+        sys.stderr.flush()
+    content = json.dumps(outcome).encode() + b"\n"
+    if len(content) > LARGEST_MESSAGE:
+        reason = f"its report is too large ({len(content)} bytes)"
+        content = json.dumps({"status": "failed", "reason": reason}).encode() + b"\n"
+    while content:
+        content = content[os.write(send, content) :]
+    os._exit(0)  # threads, exit handlers and destructors of a method have no say any more
+
+
+def _outcome(job: dict[str, Any]) -> Outcome:
+    """Run the method and store its map: the fields of the row that it fills."""
+    for plugin in job["plugins"]:
+        registry.register_plugin(plugin)
+    _, method = registry.method(job["spec"])
+    if registry.source_hash(method) != job["source_hash"]:
+        reason = "the source of the method changed during the run; run again"
+        return {"status": "failed", "reason": reason}
+    whole = read_surface(Path(job["surface"]))
+    preprocessing = ""
+    try:
+        surface, preprocessing = prepared(whole, method.requires)
+        before, wall = os.times(), time.perf_counter()
+        result = method.parameterize(surface, seed=job["seed"])
+        wall, after = time.perf_counter() - wall, os.times()
+    except UnsupportedError as error:
+        return {"status": "skipped", "reason": _line(error), "preprocessing": preprocessing}
+    timing = {
+        "preprocessing": preprocessing,
+        "seconds": wall,
+        "cpu_seconds": sum(after[:4]) - sum(before[:4]),
+    }
+    reason = fault(surface, result)
+    if reason:
+        return {"status": "failed", "reason": reason} | timing
+    arrays = map_arrays(result)
+    everything = arrays | trace_arrays(result.trace)
+    report = plain(result.report)
+    try:
+        write_map(Path(job["map"]), everything)
+    except OSError as error:  # not the method's fault: the run cannot go on
+        return {"status": "stop", "reason": f"{job['map']}: {error.strerror}"}
+    return {"status": "ok", "uv_sha256": arrays_hash(arrays), "report": report} | timing
+
+
+def fault(surface: Surface, result: object) -> str:
+    """What is wrong with `result` as a map of `surface`; "" if nothing is.
+
+    The types themselves have checked shapes, indices and that all is finite.
+    """
+    if isinstance(surface, Mesh):
+        if not isinstance(result, Parameterization):
+            return f"returned {type(result).__name__} for a mesh; it must be a Parameterization"
+        if len(result.corners) != len(surface.faces):
+            return f"returned {len(result.corners)} corner rows for {len(surface.faces)} faces"
+        return ""
+    if not isinstance(result, PointParameterization):
+        return (
+            f"returned {type(result).__name__} for a point cloud; "
+            "it must be a PointParameterization"
+        )
+    if len(result.uv) != len(surface.points):
+        return f"returned {len(result.uv)} uv rows for {len(surface.points)} points"
+    return ""
+
+
+def _line(error: BaseException) -> str:
+    """The message of an error as one line of bounded length."""
+    return " ".join(str(error).split())[:500]
+
+
+def _failure(error: BaseException) -> Outcome:
+    """The outcome of a cell that raised `error`."""
+    name = type(error).__name__
+    lacking = isinstance(error, MemoryError) or name == "OutOfMemoryError"
+    # torch raises a plain RuntimeError when the CPU allocator fails.
+    lacking = lacking or "can't allocate memory" in str(error)
+    status = "out_of_memory" if lacking else "failed"
+    return {"status": status, "reason": f"{name}: {_line(error)}".removesuffix(": ")}
+
+
+def _message(content: bytearray) -> Outcome | None:
+    """The outcome that a child sent, or None where it did not come to its end."""
+    if not content.endswith(b"\n"):
+        return None
+    try:
+        outcome = json.loads(content)
+    except ValueError:
+        return None
+    return outcome if isinstance(outcome, dict) and "status" in outcome else None
+
+
+def _death(status: int, killed_by_system: bool) -> Outcome:
+    """The outcome of a child that ended, with that wait status, without sending one."""
+    if os.WIFSIGNALED(status):
+        number = os.WTERMSIG(status)
+        if number == signal.SIGKILL and killed_by_system:
+            reason = "killed by the system, which ran out of memory"
+            return {"status": "out_of_memory", "reason": reason}
+        name = signal.Signals(number).name if number in set(signal.Signals) else f"signal {number}"
+        meaning = signal.strsignal(number) or ""
+        return {"status": "failed", "reason": f"killed by {name} ({meaning.lower()})"}
+    code = os.WEXITSTATUS(status)
+    return {"status": "failed", "reason": f"ended the process (exit status {code}) with no result"}
+
+
+def _system_kills() -> int:
+    """How often Linux has killed a process for lack of memory, here or in a container."""
+    with contextlib.suppress(OSError):
+        for line in Path("/proc/vmstat").read_text().splitlines():
+            if line.startswith("oom_kill "):
+                return int(line.split()[1])
+    return 0
+
+
+def _available(pipe: int) -> bytes:
+    """What can be read from `pipe` without waiting."""
+    content = bytearray()
+    with contextlib.suppress(BlockingIOError):
+        while chunk := os.read(pipe, 1 << 16):
+            content += chunk
+    return bytes(content)
+
+
+def _descendants() -> list[psutil.Process]:
+    """All processes below the supervisor."""
+    try:
+        return list(psutil.Process().children(recursive=True))
+    except psutil.Error:
+        return []
+
+
+def _resident(process: psutil.Process) -> int:
+    """Resident bytes of a process, 0 where it is gone."""
+    try:
+        return int(process.memory_info().rss)
+    except psutil.Error:
+        return 0
+
+
+def _kill(child: int) -> None:
+    """Kill the child, its group, and its descendants wherever they have gone."""
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(child, signal.SIGKILL)
+    for process in _descendants():
+        with contextlib.suppress(psutil.Error):
+            process.kill()
+
+
+def _bury(child: int) -> None:
+    """Kill and reap all that is left of a cell; give up on what a system call holds for seconds."""
+    if not FORKS:  # no subreaper: the group is all that can be found
+        _kill(child)
+    give_up = time.monotonic() + 5
+    while time.monotonic() < give_up:
+        try:
+            if os.waitpid(-1, os.WNOHANG) == (0, 0):
+                _kill(child)
+                time.sleep(0.005)
+        except ChildProcessError:
+            return
+
+
+if __name__ == "__main__":
+    main()
