@@ -1,0 +1,134 @@
+"""Each table as data: which models, which methods, which seeds."""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass
+
+from benchmarks.builtin import BUILTIN
+from benchmarks.models import registry
+from parapoint.errors import InputError
+
+
+@dataclass(frozen=True)
+class Suite:
+    """A table to run.
+
+    Attributes:
+        name: how it is called for.
+        title: heading of its table.
+        cases: canonical names of models, in the order of the rows.
+        methods: specs, `name` or `name(key=value, ...)`, in the order of the columns.
+        seeds: seeds, each of which is one cell.
+    """
+
+    name: str
+    title: str
+    cases: tuple[str, ...]
+    methods: tuple[str, ...]
+    seeds: tuple[int, ...] = (0,)
+
+
+ISOMETRIC = "slim(energy=symmetric_dirichlet)"
+ONE_ITERATION = "slim(energy=symmetric_dirichlet, iterations=1)"
+CONFORMAL = "slim(energy=conformal)"
+
+MESH_METHODS = ("tutte", "lscm", ISOMETRIC, CONFORMAL, "xatlas")
+
+# What the suites can afford of ParaPoint on two cores; the full budget is 10,000 of each.
+PAPER_REDUCED = "parapoint(preset=paper, points=2048, iterations=400)"
+PAPER_TINY = "parapoint(preset=paper, points=512, iterations=20)"
+FAST = "parapoint(preset=fast, time_budget=120)"
+
+PAPER_CASES = (
+    "beetle_igl",
+    "mannequin-devil",
+    "keenan-ogre",
+    "hand_1_i_f5000",
+    "max_planck_i_f8000",
+    "nefertiti-lowres_odedstein",
+)
+QUALITY_CASES = (
+    "beetle_igl",
+    "hand_1_i_f5000",
+    "max_planck_i_f8000",
+    "camelhead",
+    "keenan-ogre",
+    "mannequin-devil",
+    "nefertiti-lowres_odedstein",
+    "fertility",
+    "rocker-arm",
+    "fandisk",
+)
+
+
+def members(*sets: str) -> tuple[str, ...]:
+    """Names of the models in these sets of the registry."""
+    return tuple(model.name for model in registry().values() if model.set in sets)
+
+
+WELL_BEHAVED = members("disk", "closed", "genus", "cad", "artist")
+
+SUITES: dict[str, Suite] = {
+    suite.name: suite
+    for suite in [
+        Suite(
+            "smoke",
+            "Smoke run: two models, small budgets",
+            ("hand_1_i_f5000", "cylinder_cgal"),
+            ("tutte", "lscm", "slim(energy=symmetric_dirichlet, iterations=5)", PAPER_TINY),
+        ),
+        Suite(
+            "builtin",
+            "Surfaces made in memory, with known answers",
+            tuple(BUILTIN),
+            (*MESH_METHODS, PAPER_TINY),
+        ),
+        Suite(
+            "paper",
+            "The supplement's comparison: five disks and nefertiti",
+            PAPER_CASES,
+            ("tutte", "lscm", ISOMETRIC, ONE_ITERATION, CONFORMAL, "xatlas", PAPER_REDUCED),
+        ),
+        Suite("disk", "Disks", members("disk"), (*MESH_METHODS, FAST)),
+        Suite("closed", "Closed surfaces of genus 0", members("closed"), (*MESH_METHODS, FAST)),
+        Suite("genus", "Closed surfaces with handles", members("genus"), (*MESH_METHODS, FAST)),
+        Suite("cad", "CAD parts", members("cad"), (*MESH_METHODS, FAST)),
+        Suite("artist", "Models with a UV map of their own", members("artist"), MESH_METHODS),
+        Suite("wild", "Defective meshes", members("wild"), (*MESH_METHODS, FAST)),
+        Suite("scans", "Point clouds and noisy scans", members("scans"), (*MESH_METHODS, FAST)),
+        Suite(
+            "core",
+            "All well-behaved models",
+            tuple(dict.fromkeys([*PAPER_CASES, *WELL_BEHAVED])),
+            (*MESH_METHODS, FAST),
+        ),
+        Suite(
+            "ablation",
+            "The paper's ablation: distortion terms and branches",
+            ("cube_odedstein", "cylinder_cgal", "eight_cfwen"),
+            (PAPER_REDUCED,),  # and its variants, as the method names them
+        ),
+        Suite(
+            "quality",
+            "ParaPoint's fast preset on ten models, three seeds",
+            QUALITY_CASES,
+            ("lscm", ISOMETRIC, CONFORMAL, FAST),
+            (0, 1, 2),
+        ),
+    ]
+}
+"""All suites by name."""
+
+
+def suite(name: str) -> Suite:
+    """The suite of this name.
+
+    Raises:
+        InputError: there is none; the message names all.
+    """
+    if name not in SUITES:
+        near = difflib.get_close_matches(name, SUITES, n=1)
+        hint = f"perhaps {near[0]}; " if near else ""
+        raise InputError(f"there is no suite {name!r}; {hint}there are {', '.join(SUITES)}")
+    return SUITES[name]
