@@ -1,1 +1,62 @@
-"""."""
+'''The methods that ParaPoint is compared with, and how to add one.
+
+A method is one small dataclass. Its fields are its hyperparameters, its docstring says whose it is,
+`requires` says what a surface must be (words of `parapoint.method.REQUIREMENTS`), and
+`parameterize` maps a surface. This is a whole one, the file `planar.py`:
+
+    """Projection to a plane."""
+    from dataclasses import dataclass
+    from typing import ClassVar
+
+    import numpy as np
+    from parapoint import Parameterization
+
+
+    @dataclass(frozen=True)
+    class Planar:
+        """Orthogonal projection to the plane of largest variance (K. Pearson 1901)."""
+
+        scale: float = 1.0
+        requires: ClassVar[frozenset[str]] = frozenset({"faces"})
+
+        def parameterize(self, surface, *, seed):
+            centred = surface.vertices - surface.vertices.mean(axis=0)
+            axes = np.linalg.svd(centred, full_matrices=False)[2][:2]
+            return Parameterization(self.scale * centred @ axes.T, surface.faces)
+
+Run it, as it is or with other parameters:
+
+    python -m benchmarks run smoke --plugin planar.py:Planar --methods planar,slim
+    python -m benchmarks run smoke --plugin planar.py:Planar --methods "planar(scale=2)"
+
+Check it: `parapoint.testing.check_method(Planar())` raises at the first promise that is broken.
+
+To share it, make it a package that names it in its `pyproject.toml`; wherever the package is
+installed, `planar` is then a method like any other:
+
+    [project.entry-points."parapoint.methods"]
+    planar = "planar:Planar"
+
+What a method may count on, and what it must keep:
+
+- A mesh is manifold, a disk, ... only if `requires` says so; a surface that is not is never handed
+  over, and its row is `skipped` with the reason. With `disk_after_cut`, closed meshes and those
+  with handles come cut to a disk, all methods with the same cut; disks with holes come as they are.
+- Vertices may be duplicate or unreferenced, triangles thin, scales any. Arrays are read-only.
+- The result has one row of `corners` for each face, in order; a row of `uv` belongs to one place
+  of the surface. Scale, rotation and mirrored charts are free.
+- Every random draw comes from `seed`.
+- Only `parameterize` is timed: import libraries at the top of the file. One that need not be
+  installed is imported by `baselines.optional.optional`, so that its rows are `skipped` and say
+  what to install.
+- Raise `UnsupportedError` for what the method cannot take though `requires` admits it (`skipped`);
+  any other error is a `failed` row with its message.
+- `trace` may hold energies and maps on the way; `report` what should stand beside the result.
+- `packages` names the libraries whose versions are part of the method: results are run anew when
+  one changes, as they are when the method's own source does.
+
+A program that reads and writes OBJ files needs no code; it is run by
+`external(command="tool {input} {output}")`.
+
+A method of this package is a file here and a line in `baselines.registry.METHODS`.
+'''

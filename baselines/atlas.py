@@ -1,0 +1,50 @@
+"""What the atlas makers share: from a library's output to a map of the mesh that went in."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.flattening import FlatteningError
+from parapoint.parameterization import Parameterization
+from parapoint.surface import Mesh
+
+
+def atlas(
+    mesh: Mesh,
+    *,
+    source: npt.ArrayLike,
+    corners: npt.ArrayLike,
+    uv: npt.ArrayLike,
+    page_size: tuple[float, float],
+    page: npt.ArrayLike,
+) -> Parameterization:
+    """The map in texels, pages side by side.
+
+    Both libraries divide u by the width and v by the height of a page that need not be square;
+    taken as it is, that would stretch every chart.
+
+    Args:
+        mesh: what went in.
+        source: (T,) vertex of the mesh for each row of `uv`.
+        corners: (F, 3) rows of `uv`, faces in the order of the mesh.
+        uv: (T, 2) coordinates in [0, 1] on their page.
+        page_size: width and height of a page in texels.
+        page: (T,) page of each row; rows that are on none (of faces without area) lie at zero.
+
+    Raises:
+        FlatteningError: faces or corners are not those of the mesh, or uv is not finite.
+    """
+    source, uv = np.asarray(source, dtype=np.int64), np.array(uv, dtype=np.float64)
+    corners, page = np.asarray(corners, dtype=np.int64), np.asarray(page, dtype=np.int64)
+    if corners.shape != mesh.faces.shape or not np.array_equal(source[corners], mesh.faces):
+        raise FlatteningError(
+            f"the atlas has {len(corners)} faces that are not the mesh's {len(mesh.faces)} in order"
+        )
+    if not np.isfinite(uv).all():
+        raise FlatteningError("the atlas has coordinates that are not finite")
+    placed = (page >= 0) & (page < np.iinfo(np.uint32).max)
+    uv *= page_size
+    uv[placed, 0] += page[placed] * float(page_size[0])
+    report: dict[str, object] = {"unplaced_faces": int((~placed[corners]).any(axis=1).sum())}
+    return Parameterization(uv, corners, report=report)

@@ -1,0 +1,319 @@
+"""The methods by name: the built-in table, installed plugins, and files given for one run.
+
+Only what is asked for is imported: looking up one method leaves the libraries of all others, and
+torch, alone.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import importlib
+import importlib.util
+import re
+import sys
+import types
+from dataclasses import MISSING, dataclass, fields, is_dataclass
+from difflib import get_close_matches
+from importlib import metadata
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Literal, Union, cast, get_args, get_origin, get_type_hints
+
+from parapoint.errors import InputError
+from parapoint.method import REQUIREMENTS, Method
+
+METHODS: dict[str, str] = {
+    "tutte": "baselines.tutte:Tutte",
+    "harmonic": "baselines.harmonic:Harmonic",
+    "lscm": "baselines.lscm:LSCM",
+    "arap": "baselines.arap:ARAP",
+    "slim": "baselines.slim:SLIM",
+    "bff": "baselines.bff:BFF",
+    "xatlas": "baselines.xatlas_charts:Xatlas",
+    "uvunwrap": "baselines.uvunwrap:UVUnwrap",
+    "meshlab_lscm": "baselines.meshlab:MeshLabLSCM",
+    "meshlab_harmonic": "baselines.meshlab:MeshLabHarmonic",
+    "meshlab_voronoi": "baselines.meshlab:MeshLabVoronoi",
+    "meshlab_triangles": "baselines.meshlab:MeshLabTriangles",
+    "external": "baselines.external:External",
+    "parapoint": "parapoint.estimator:ParaPoint",
+}
+"""Name -> "module:Class" of each method that comes with the benchmark."""
+
+GROUP = "parapoint.methods"
+"""Entry-point group in which an installed package names its methods."""
+
+_plugins: dict[str, type[Method]] = {}
+
+
+@dataclass(frozen=True)
+class Description:
+    """A method in words.
+
+    Attributes:
+        name: its name in the registry.
+        summary: first line of its docstring.
+        requires: what a surface must be, words of `parapoint.method.REQUIREMENTS`, sorted.
+        parameters: its fields and their defaults, as source text; "" for none.
+    """
+
+    name: str
+    summary: str
+    requires: tuple[str, ...]
+    parameters: dict[str, str]
+
+
+def names() -> list[str]:
+    """Names of all methods: built in, installed, given for this run."""
+    return list(dict.fromkeys([*METHODS, *_installed(), *_plugins]))
+
+
+def method(spec: str) -> tuple[str, Method]:
+    """The name and the method of a spec: "slim", or "slim(energy=conformal, iterations=5)".
+
+    Values are Python literals; a bare word is a string.
+
+    Raises:
+        InputError: the spec cannot be read; there is no such method or parameter (near names are
+            given); a value has the wrong type.
+    """
+    name, arguments = _parsed(spec)
+    kind = _class(name)
+    hints = get_type_hints(kind)
+    known = {field.name: hints[field.name] for field in fields(cast("Any", kind)) if field.init}
+    for key, value in arguments.items():
+        if key not in known:
+            raise InputError(f"{name} has no parameter {key!r}; {_near(key, list(known))}")
+        arguments[key] = _checked(value, known[key], f"{name}: {key}")
+    return name, kind(**arguments)
+
+
+def register_plugin(location: str) -> str:
+    """The name under which the class at "path/to/file.py:Class" is known for this run.
+
+    The name is the class's in lower case; it may not be taken.
+
+    Raises:
+        InputError: the location cannot be read, the file does not run, the class is no method, or
+            its name is taken.
+    """
+    path, _, class_name = location.rpartition(":")
+    if not path or not class_name.isidentifier():
+        raise InputError(f"a plugin is given as path/to/file.py:Class, not {location!r}")
+    file = Path(path).resolve()
+    if not file.is_file():
+        raise InputError(f"there is no plugin file {path}")
+    # The module's name holds the path: two files of one name may be given.
+    module_name = f"plugin_{hashlib.sha256(str(file).encode()).hexdigest()[:8]}_{file.stem}"
+    if module_name not in sys.modules:
+        spec = importlib.util.spec_from_file_location(module_name, file)
+        if spec is None or spec.loader is None:
+            raise InputError(f"{path} is no Python file")
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[module_name] = module  # dataclass and pickle look their module up here
+        try:
+            spec.loader.exec_module(module)
+        except Exception as error:  # whatever a user's file raises is bad input
+            del sys.modules[module_name]
+            raise InputError(f"{path} does not run: {type(error).__name__}: {error}") from error
+    name = class_name.lower()
+    kind = _method_class(sys.modules[module_name], class_name, path)
+    if name in names() and _plugins.get(name) is not kind:
+        raise InputError(f"there is a method {name!r} already; rename the class in {path}")
+    _plugins[name] = kind
+    return name
+
+
+def describe(name: str) -> Description:
+    """What there is to say of a method, without making one.
+
+    Raises:
+        InputError: there is no such method.
+    """
+    kind = _class(name)
+    parameters = {}
+    for field in fields(cast("Any", kind)):
+        if field.init:
+            factory = field.default_factory
+            default = field.default if factory is MISSING else factory()
+            parameters[field.name] = "" if default is MISSING else repr(default)
+    summary = (kind.__doc__ or "").strip().split("\n", maxsplit=1)[0]
+    return Description(name, summary, tuple(sorted(kind.requires)), parameters)
+
+
+def source_hash(made: Method) -> str:
+    """Hash of what determines a method's results beside its parameters, the same on any machine.
+
+    It covers the source of the method's module and of the modules of the same package that this
+    one imports, directly or not, and the versions of the packages that the class names in
+    `packages`. For ParaPoint it is thus the whole of `parapoint` that it uses.
+    """
+    module = sys.modules[type(made).__module__]
+    digest = hashlib.sha256()
+    for name, path in sorted(_sources(module).items()):
+        text = path.read_text(encoding="utf-8").replace("\r\n", "\n")
+        # A plugin file's module name holds its path, which is no part of its identity.
+        digest.update(f"{name if '.' in name else path.name}\n{text}\n".encode())
+    for package in getattr(made, "packages", ()):
+        digest.update(f"{package} {_version(package)}\n".encode())
+    return digest.hexdigest()[:16]
+
+
+def _parsed(spec: str) -> tuple[str, dict[str, Any]]:
+    """The name and the arguments in a spec.
+
+    Raises:
+        InputError: it is no name, or name(key=value, ...).
+    """
+    bad = InputError(f"a method is given as name or name(key=value, ...), not {spec!r}")
+    found = re.fullmatch(r"\s*([\w.+-]+)\s*(?:\((.*)\))?\s*", spec, flags=re.DOTALL)
+    if found is None:
+        raise bad
+    name, inside = found.groups()
+    try:
+        call = ast.parse(f"_({inside or ''})", mode="eval").body
+    except SyntaxError:
+        raise bad from None
+    if not isinstance(call, ast.Call) or call.args or any(key.arg is None for key in call.keywords):
+        raise bad
+    arguments: dict[str, Any] = {}
+    for keyword in call.keywords:
+        assert keyword.arg is not None
+        if keyword.arg in arguments:
+            raise InputError(f"{name}: parameter {keyword.arg!r} is given twice")
+        if isinstance(keyword.value, ast.Name):
+            arguments[keyword.arg] = keyword.value.id
+            continue
+        try:
+            arguments[keyword.arg] = ast.literal_eval(keyword.value)
+        except ValueError:
+            text = ast.unparse(keyword.value)
+            raise InputError(f"{name}: {keyword.arg}={text} is no plain value") from None
+    return name, arguments
+
+
+def _checked(value: object, hint: Any, what: str) -> object:
+    """`value` as a parameter of type `hint`: an int will do for a float, a list for a tuple.
+
+    Raises:
+        InputError: it has another type.
+    """
+    if hint is Any:
+        return value
+    kind, options = get_origin(hint), get_args(hint)
+    if kind is Literal:
+        if value in options:
+            return value
+        raise InputError(f"{what} must be one of {', '.join(map(str, options))}, not {value!r}")
+    if kind in (Union, types.UnionType):
+        for option in options:
+            try:
+                return _checked(value, option, what)
+            except InputError:
+                continue
+    elif kind is tuple and isinstance(value, (tuple, list)):
+        item_hints = [options[0]] * len(value) if options[-1] is Ellipsis else options
+        if len(item_hints) == len(value):
+            return tuple(_checked(v, h, what) for v, h in zip(value, item_hints, strict=True))
+    elif hint is float and isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    elif (
+        isinstance(hint, type)
+        and isinstance(value, hint)
+        and (hint is bool or not isinstance(value, bool))  # a bool is an int to Python
+    ):
+        return value
+    wanted = hint.__name__ if isinstance(hint, type) else str(hint)
+    raise InputError(f"{what} must be {wanted}, not {value!r}")
+
+
+def _near(name: str, known: list[str]) -> str:
+    """The known names nearest to one that is not, in words."""
+    if not known:
+        return "it has none"
+    near = get_close_matches(name, known, n=3, cutoff=0.5)
+    return f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(known)}"
+
+
+def _installed() -> dict[str, metadata.EntryPoint]:
+    """Entry points of installed packages by name."""
+    return {entry.name: entry for entry in metadata.entry_points(group=GROUP)}
+
+
+def _class(name: str) -> type[Method]:
+    """The class of a method.
+
+    Raises:
+        InputError: there is none of this name, or it cannot be imported.
+    """
+    if name in METHODS:
+        module_name, _, class_name = METHODS[name].partition(":")
+        return _method_class(importlib.import_module(module_name), class_name, module_name)
+    if name in _plugins:
+        return _plugins[name]
+    entry = _installed().get(name)
+    if entry is None:
+        raise InputError(f"there is no method {name!r}; {_near(name, names())}")
+    try:
+        module = importlib.import_module(entry.module)
+    except ImportError as error:
+        raise InputError(
+            f"the plugin {name} ({entry.value}) cannot be imported: {error}"
+        ) from error
+    return _method_class(module, entry.attr, entry.value)
+
+
+def _method_class(module: ModuleType, class_name: str, where: str) -> type[Method]:
+    """The class of this name in a module.
+
+    Raises:
+        InputError: there is none, or it is no method.
+    """
+    kind = getattr(module, class_name, None)
+    if not isinstance(kind, type):
+        raise InputError(f"there is no class {class_name} in {where}")
+    if not is_dataclass(kind) or not callable(getattr(kind, "parameterize", None)):
+        raise InputError(f"{class_name} in {where} is no dataclass with a method parameterize")
+    requires = getattr(kind, "requires", None)
+    if not isinstance(requires, frozenset) or not requires <= REQUIREMENTS.keys():
+        raise InputError(
+            f"{class_name}.requires in {where} must be a frozenset of "
+            f"{', '.join(sorted(REQUIREMENTS))}; it is {requires!r}"
+        )
+    return cast("type[Method]", kind)
+
+
+def _sources(module: ModuleType) -> dict[str, Path]:
+    """Source file of a module and of the modules of its package that it imports, by name."""
+    package = module.__name__.partition(".")[0]
+    assert module.__file__ is not None
+    sources = {module.__name__: Path(module.__file__)}
+    left = [module.__name__]
+    while left:
+        tree = ast.parse(sources[left.pop()].read_text(encoding="utf-8"))
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Import):
+                imported = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                imported = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+            else:
+                continue
+            for name in imported:
+                if name.partition(".")[0] != package or name in sources or name == package:
+                    continue
+                path = Path(sys.modules[package].__path__[0], *name.split(".")[1:]).with_suffix(
+                    ".py"
+                )
+                if path.is_file():
+                    sources[name] = path
+                    left.append(name)
+    return sources
+
+
+def _version(package: str) -> str:
+    """Version of an installed package without its local part (as in 2.13.0+cpu), or "absent"."""
+    try:
+        return metadata.version(package).partition("+")[0]
+    except metadata.PackageNotFoundError:
+        return "absent"

@@ -1,0 +1,230 @@
+"""Conformance suite for methods: `check_method` holds one to every promise of the protocol."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from dataclasses import asdict, is_dataclass
+from typing import Any, cast
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from parapoint.cutting import cut_along
+from parapoint.method import REQUIREMENTS, Method, UnsupportedError, prepared
+from parapoint.parameterization import Parameterization, PointParameterization
+from parapoint.surface import FloatArray, IntArray, Mesh, PointCloud, Surface
+
+SEED = 7
+
+
+def check_method(method: Method, surface: Surface | None = None) -> None:
+    """Hold a method to the protocol, on tiny surfaces (under 200 vertices each).
+
+    - It is a dataclass, its parameters and its report can be written as JSON, it can be pickled.
+    - `requires` has known words only and is honest: what it admits is parameterized (after the cut
+      where it says `disk_after_cut`); a method that needs faces raises on a point cloud.
+    - The map has the type for the surface, is finite and not collapsed to a line, and its faces and
+      corners are in the order of the mesh.
+    - The same seed gives the same map, bit by bit. The arrays of the surface do not change.
+    - A trace counts up in steps and seconds, and its maps are finite and of the result's shape.
+
+    Args:
+        method: what is checked.
+        surface: one surface to check it on, in place of the tiny ones; an unsupported one is fine.
+
+    Raises:
+        AssertionError: a promise is broken; the message says which, and on which surface.
+        UnsupportedError: nothing could be checked, as the method refuses every surface (a package
+            that it needs is missing, say).
+    """
+    name = type(method).__name__
+    _check_declaration(method, name)
+    surfaces = sample_surfaces() if surface is None else {"the surface": surface}
+    refusal: UnsupportedError | None = None
+    checked = 0
+    for title, sample in surfaces.items():
+        where = f"{name} on {title}"
+        try:
+            given, _ = prepared(sample, method.requires)
+        except UnsupportedError as error:
+            refusal = error
+            if isinstance(sample, PointCloud):
+                _check_refusal(method, sample, where)
+            continue
+        try:
+            first = _check_run(method, given, where)
+            if not checked:
+                _check_repeat(method, given, first, where)
+        except UnsupportedError as error:
+            refusal = error
+            if checked:
+                raise AssertionError(f"{where}: refused, though it meets `requires`") from error
+            continue
+        checked += 1
+    if not checked and refusal is not None:
+        raise refusal
+
+
+def sample_surfaces() -> dict[str, Surface]:
+    """The surfaces of `check_method` by title."""
+    disk = irregular_disk()
+    # A slit from the boundary inwards leaves a disk with duplicate vertices.
+    slit = cut_along(disk, np.array([[36, 37], [37, 38], [38, 39]]))
+    unreferenced = np.array([[9.0, 9.0, 9.0]])
+    littered = Mesh(np.concatenate([unreferenced, slit.vertices, unreferenced]), slit.faces + 1)
+    inside = np.abs(disk.vertices[:, :2]).max(axis=1) < 0.4
+    holed = Mesh(disk.vertices, disk.faces[~inside[disk.faces].all(axis=1)])
+    two = Mesh(
+        np.concatenate([disk.vertices, disk.vertices + np.array([3.0, 0.0, 0.0])]),
+        np.concatenate([disk.faces, disk.faces + len(disk.vertices)]),
+    )
+    plane = np.random.default_rng(SEED).uniform(-1, 1, (160, 2))
+    return {
+        "a disk of irregular triangles": disk,
+        "a disk with unreferenced and duplicate vertices": littered,
+        "a disk with a hole": holed,
+        "a sphere": sphere(),
+        "two components": two,
+        "a point cloud": PointCloud(np.column_stack([plane, 0.3 * plane[:, 0] ** 2])),
+    }
+
+
+def irregular_disk() -> Mesh:
+    """A saddle over a square of 9 x 9 vertices, inner ones moved by up to 0.3 of their spacing.
+
+    Vertex 9 i + j stands in row i, column j.
+    """
+    steps = np.linspace(-1, 1, 9)
+    xy = np.stack(np.meshgrid(steps, steps), axis=-1)
+    xy[1:-1, 1:-1] += np.random.default_rng(SEED).uniform(-0.075, 0.075, (7, 7, 2))
+    x, y = xy.reshape(-1, 2).T
+    corner = np.arange(81).reshape(9, 9)
+    a, b, c, d = corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]
+    faces = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
+    return Mesh(np.stack([x, y, 0.4 * (x**2 - y**2)], axis=1), faces)
+
+
+def sphere() -> Mesh:
+    """The convex hull of 90 points on a spiral around the unit sphere, faces outward."""
+    count = np.arange(90)
+    z = 1 - (2 * count + 1) / 90
+    angle = np.pi * (3 - np.sqrt(5)) * count
+    radius = np.sqrt(1 - z**2)
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
+    faces: IntArray = ConvexHull(points).simplices.astype(np.int64)
+    inward = np.linalg.det(points[faces]) < 0
+    faces[inward] = faces[inward][:, ::-1]
+    return Mesh(points, faces)
+
+
+def _check_declaration(method: Method, name: str) -> None:
+    """The class is as the protocol says."""
+    assert is_dataclass(method), f"{name}: is no dataclass"
+    assert not isinstance(method, type), f"{name}: give a method, not its class"
+    assert isinstance(method.requires, frozenset), f"{name}: requires is no frozenset"
+    unknown = sorted(method.requires - REQUIREMENTS.keys())
+    assert not unknown, f"{name}: requires unknown words {unknown}; known: {sorted(REQUIREMENTS)}"
+    parameters = asdict(cast("Any", method))
+    _check_json(parameters, f"{name}: its parameters")
+    try:
+        copy = pickle.loads(pickle.dumps(method))  # noqa: S301 (our own bytes)
+    except Exception as error:
+        raise AssertionError(f"{name}: cannot be pickled: {error}") from error
+    assert asdict(copy) == parameters, f"{name}: pickling changes its parameters"
+
+
+def _check_json(value: object, what: str) -> None:
+    """`value` can be written as JSON."""
+    try:
+        json.dumps(value)
+    except (TypeError, ValueError) as error:
+        raise AssertionError(f"{what} cannot be written as JSON: {error}") from error
+
+
+def _check_refusal(method: Method, surface: Surface, where: str) -> None:
+    """The method raises on what its `requires` refuses."""
+    try:
+        method.parameterize(surface, seed=SEED)
+    except Exception:  # noqa: BLE001 (any error is a refusal; only silence is not)
+        return
+    raise AssertionError(f"{where}: returned a map, though `requires` refuses this surface")
+
+
+def _check_run(
+    method: Method, surface: Surface, where: str
+) -> Parameterization | PointParameterization:
+    """The map of a surface that the method admits, checked."""
+    before = _arrays(surface)
+    result = method.parameterize(surface, seed=SEED)
+    for name, array in _arrays(surface).items():
+        assert np.array_equal(array, before[name]), f"{where}: changed the surface's {name}"
+    if isinstance(surface, Mesh):
+        assert isinstance(result, Parameterization), (
+            f"{where}: returned {type(result).__name__}; a mesh needs a Parameterization"
+        )
+        _check_corners(surface, result, where)
+    else:
+        assert isinstance(result, PointParameterization), (
+            f"{where}: returned {type(result).__name__}; a cloud needs a PointParameterization"
+        )
+        shape = (len(surface.points), 2)
+        assert result.uv.shape == shape, f"{where}: uv has shape {result.uv.shape}, not {shape}"
+    spread = np.linalg.svd(result.uv - result.uv.mean(axis=0), compute_uv=False)
+    assert spread[1] > 1e-9 * spread[0], f"{where}: the map collapsed to a line or a point"
+    _check_trace(result, where)
+    _check_json(dict(result.report), f"{where}: the report")
+    return result
+
+
+def _arrays(surface: Surface) -> dict[str, FloatArray | IntArray]:
+    """Copies of the arrays of a surface by name."""
+    if isinstance(surface, Mesh):
+        return {"vertices": surface.vertices.copy(), "faces": surface.faces.copy()}
+    arrays: dict[str, FloatArray | IntArray] = {"points": surface.points.copy()}
+    if surface.normals is not None:
+        arrays["normals"] = surface.normals.copy()
+    return arrays
+
+
+def _check_corners(mesh: Mesh, result: Parameterization, where: str) -> None:
+    """One row of corners a face, and no row of uv for two places of the surface."""
+    shape = mesh.faces.shape
+    assert result.corners.shape == shape, (
+        f"{where}: corners have shape {result.corners.shape}, the faces {shape}"
+    )
+    place = mesh.vertices[mesh.faces].reshape(-1, 3)
+    row = result.corners.reshape(-1)
+    last = np.zeros((len(result.uv), 3))
+    last[row] = place
+    assert np.array_equal(last[row], place), (
+        f"{where}: a row of uv serves corners at different places: "
+        "faces or corners are not in the order of the mesh"
+    )
+
+
+def _check_trace(result: Parameterization | PointParameterization, where: str) -> None:
+    """The trace counts up, and its maps fit the result."""
+    for name, values in (
+        ("iterations", [point.iteration for point in result.trace]),
+        ("seconds", [point.seconds for point in result.trace]),
+    ):
+        assert values == sorted(values), f"{where}: the {name} of the trace go back"
+    for point in result.trace:
+        if point.uv is not None:
+            fits = point.uv.shape == result.uv.shape and np.isfinite(point.uv).all()
+            assert fits, f"{where}: the map at iteration {point.iteration} of the trace is not one"
+
+
+def _check_repeat(
+    method: Method,
+    surface: Surface,
+    first: Parameterization | PointParameterization,
+    where: str,
+) -> None:
+    """The same seed gives the same map."""
+    second = method.parameterize(surface, seed=SEED)
+    same = np.array_equal(first.uv, second.uv)
+    if isinstance(first, Parameterization) and isinstance(second, Parameterization):
+        same = same and np.array_equal(first.corners, second.corners)
+    assert same, f"{where}: another map under the same seed"
