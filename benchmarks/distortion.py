@@ -17,6 +17,7 @@ OptCuts / 4 with an ideal of 1); `angle_discrepancy_total` is 3 times
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -165,33 +166,33 @@ class FaceDistortion:
     angle_difference: FloatArray
     finite: BoolArray
 
-    @property
+    @cached_property
     def quasi_conformal(self) -> FloatArray:
         """(N,) sigma1 / sigma2, at least 1; inf where degenerate in UV."""
         return self._or_inf(self.sigma1[self.finite] / self.sigma2[self.finite])
 
-    @property
+    @cached_property
     def area_ratio(self) -> FloatArray:
         """(N,) UV area / 3D area; 0 where degenerate in UV."""
         return self.uv_area / self.area
 
-    @property
+    @cached_property
     def area_log_ratio(self) -> FloatArray:
         """(N,) abs(log(UV area / 3D area)); inf where degenerate in UV."""
         return self._or_inf(np.abs(np.log(self.area_ratio[self.finite])))
 
-    @property
+    @cached_property
     def symmetric_dirichlet(self) -> FloatArray:
         """(N,) sigma1^2 + sigma2^2 + sigma1^-2 + sigma2^-2, at least 4; inf where degenerate."""
         squares = np.stack([self.sigma1[self.finite], self.sigma2[self.finite]]) ** 2
         return self._or_inf((squares + 1 / squares).sum(axis=0))
 
-    @property
+    @cached_property
     def isometric(self) -> FloatArray:
         """(N,) max(sigma1, 1 / sigma2), at least 1; inf where degenerate in UV."""
         return self._or_inf(np.maximum(self.sigma1[self.finite], 1 / self.sigma2[self.finite]))
 
-    @property
+    @cached_property
     def stretch(self) -> FloatArray:
         """(N,) sqrt((sigma1^-2 + sigma2^-2) / 2), Sander et al. 2001; inf where degenerate."""
         squares = np.stack([self.sigma1[self.finite], self.sigma2[self.finite]]) ** 2

@@ -494,8 +494,14 @@ def evaluate(
 
 def values(state: MapState) -> dict[str, float]:
     """Every metric that `state` can have, by name."""
-    left_out = {"points"} if state.reference is not None else {"points", "reference"}
-    return {m.name: m.function(state) for m in METRICS.values() if m.group not in left_out}
+    found: dict[str, float] = {}
+    for name, metric in METRICS.items():
+        if metric.group == "points" or (metric.group == "reference" and state.reference is None):
+            continue
+        everywhere = name.removesuffix(WITHOUT_SPANNING)
+        same = everywhere in found and state.distortion_without_spanning is state.distortion
+        found[name] = found[everywhere] if same else metric.function(state)
+    return found
 
 
 def evaluate_points(cloud: PointCloud, parameterization: PointParameterization) -> dict[str, float]:

@@ -100,7 +100,7 @@ def resolution(seams: Seams) -> float:
     (Shay et al.). Faces degenerate in 3D take no part.
     """
     sigma2 = seams.triangles.sigma2[~seams.triangles.degenerate_3d]
-    side = square_side(seams.parameterization.uv[np.unique(seams.parameterization.corners)])
+    side = square_side(_used(seams.parameterization, seams.parameterization.uv))
     smallest = float(sigma2.min()) if len(sigma2) else 0.0
     return side / smallest if smallest > 0 else float("inf")
 
@@ -121,43 +121,48 @@ def spanning_faces(mesh: Mesh, parameterization: Parameterization) -> BoolArray:
 
 def spanning_edges(mesh: Mesh, parameterization: Parameterization) -> BoolArray:
     """(E,) whether an edge of `parameterization.edges` spans a seam, by the rule of this module."""
-    vertices = mesh.vertices / power_of_two(mesh.vertices)
     uv = parameterization.uv / power_of_two(parameterization.uv)
-    edges = parameterization.edges
-    # The 3D vector of each UV edge, from its smaller to its larger row.
-    start, end = mesh.halfedges.T
-    forward = parameterization.corners < np.roll(parameterization.corners, -1, axis=1)
-    sign = np.where(forward.reshape(-1), 1.0, -1.0)
-    vectors = np.zeros((len(edges), 3))
-    vectors[parameterization.edge_of_halfedge] = (vertices[end] - vertices[start]) * sign[:, None]
-    length, uv_length = _lengths(vectors), _lengths(uv[edges[:, 1]] - uv[edges[:, 0]])
-
-    used = np.unique(parameterization.corners)
-    spanning = (uv_length > SPANNING_LENGTH * square_side(uv[used])) & (length > 0)
+    edges, corners = parameterization.edges, parameterization.corners
+    uv_length = _lengths(uv[edges[:, 1]] - uv[edges[:, 0]])
+    spanning = uv_length > SPANNING_LENGTH * square_side(_used(parameterization, uv))
     # Only long edges need surroundings: few, unless the mesh is coarse.
-    candidates = np.flatnonzero(spanning)
-    stretch = np.divide(uv_length, length, out=np.zeros_like(length), where=length > 0)
-    usual = _usual_stretch(edges, stretch, length > 0, candidates, len(uv))
-    kept = stretch[candidates] > SPANNING_STRETCH * usual
-    spanning[candidates[~kept]] = False
-    candidates = candidates[kept]
-    ends = edges[candidates]
-    usual = _usual_length(
-        vertices[mesh.faces], uv, parameterization.corners, ends, vectors[candidates]
-    )
-    spanning[candidates[uv_length[candidates] <= SPANNING_STRETCH * usual]] = False
+    wanted = np.zeros(len(uv), dtype=bool)
+    wanted[edges[spanning]] = True
+    near = np.flatnonzero(wanted[edges].any(axis=1))
+    vertices = mesh.vertices / power_of_two(mesh.vertices)
+    vectors = _vectors(vertices, mesh, parameterization, near)
+    length = _lengths(vectors)
+    known = length > 0
+    near, vectors, length = near[known], vectors[known], length[known]
+    stretch = uv_length[near] / length
+    ends = edges[near]
+    usual_stretch = _lower_quartiles(ends.reshape(-1), np.repeat(stretch, 2), len(uv))
+    torn = spanning[near] & (stretch > SPANNING_STRETCH * usual_stretch[ends].min(axis=1))
+    usual = _usual_length(vertices[mesh.faces], uv, corners, ends[torn], vectors[torn])
+    kept = uv_length[near[torn]] > SPANNING_STRETCH * usual
+    spanning[:] = False
+    spanning[near[torn][kept]] = True
     return np.asarray(spanning)
 
 
-def _usual_stretch(
-    edges: IntArray, stretch: FloatArray, known: BoolArray, candidates: IntArray, rows: int
+def _used(parameterization: Parameterization, uv: FloatArray) -> FloatArray:
+    """The rows of `uv` that a face uses."""
+    used = np.zeros(len(uv), dtype=bool)
+    used[parameterization.corners] = True
+    return uv[used]
+
+
+def _vectors(
+    vertices: FloatArray, mesh: Mesh, parameterization: Parameterization, chosen: IntArray
 ) -> FloatArray:
-    """(C,) of both ends of each candidate the smaller lower quartile of the stretch of edges."""
-    wanted = np.zeros(rows, dtype=bool)
-    wanted[edges[candidates]] = True
-    edge, end = np.nonzero(wanted[edges] & known[:, None])
-    at_row = _lower_quartiles(edges[edge, end], stretch[edge], rows)
-    return np.asarray(at_row[edges[candidates]].min(axis=1, initial=np.inf))
+    """(C, 3) the 3D vectors of the chosen UV edges, from the smaller to the larger row."""
+    halfedge = np.zeros(len(parameterization.edges), dtype=np.int64)
+    halfedge[parameterization.edge_of_halfedge] = np.arange(3 * len(mesh.faces))
+    start, end = mesh.halfedges[halfedge[chosen]].T
+    row = parameterization.corners.reshape(-1)[halfedge[chosen]]
+    forward = row == parameterization.edges[chosen, 0]
+    vectors = vertices[end] - vertices[start]
+    return np.asarray(np.where(forward[:, None], vectors, -vectors))
 
 
 def _usual_length(
