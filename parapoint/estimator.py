@@ -1,0 +1,575 @@
+"""ParaPoint as a user meets it: fit a surface, map points to the plane and back, find the seams."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import logging
+import math
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple, Self
+
+import numpy as np
+import numpy.typing as npt
+import safetensors
+import safetensors.torch
+import torch
+from scipy.spatial import cKDTree
+from torch import Tensor
+
+from parapoint.errors import InputError
+from parapoint.losses import DISTORTIONS, EIGENVALUES
+from parapoint.networks import ACTIVATIONS, Networks
+from parapoint.parameterization import Parameterization, PointParameterization, TracePoint
+from parapoint.presets import PRESETS, Preset
+from parapoint.surface import BoolArray, FloatArray, Mesh, PointCloud, Surface
+from parapoint.trainer import Step, Trainer, surface_sample
+
+logger = logging.getLogger("parapoint")
+
+FORMAT = 1
+"""Version of saved models and checkpoints."""
+FEWEST_POINTS = 100
+"""Distinct points that a fit needs."""
+FEWEST_VERTICES = 2_000
+"""A mesh of fewer vertices is sampled on its faces instead: its vertices alone do not show it."""
+BATCH = {"cpu": 2_048, "cuda": 65_536}
+"""Points mapped at a time: on a CPU the layers of so many stay in its cache."""
+CHECKPOINT_SECONDS = 60.0
+KEPT_MAPS = 8
+"""Maps kept in the trace of `parameterize`."""
+MOST_KEPT_ROWS = 50_000
+"""No maps are kept of surfaces with more points."""
+
+
+class Progress(NamedTuple):
+    """What a callback of `ParaPoint.fit` gets after each step.
+
+    Attributes:
+        step: where the run is.
+        remaining: seconds to the end, as far as can be told.
+    """
+
+    step: Step
+    remaining: float
+
+
+@dataclass
+class ParaPoint:
+    """Global, free-boundary UV maps of point clouds, learned for each (Zhang, Hou and He, 2024).
+
+    Follows scikit-learn: fields are parameters, None takes the preset's value, and what `fit`
+    learns ends in an underscore. Also a `Method`: `parameterize` fits and maps a surface.
+
+        >>> import numpy as np
+        >>> from parapoint import ParaPoint
+        >>> points = np.random.default_rng(0).normal(size=(2000, 3))
+        >>> points /= np.linalg.norm(points, axis=1, keepdims=True)
+        >>> model = ParaPoint(preset="paper", iterations=500).fit(points)
+        >>> uv = model.transform(points)                  # (2000, 2)
+        >>> cut = points[model.seams()]                   # the points where the surface is open
+
+    Attributes:
+        preset: "paper" or "fast"; `parapoint.presets` has every number of each.
+        points: training points.
+        iterations: steps, the warm-up included.
+        time_budget: seconds of fitting; the schedule follows the time where that ends sooner.
+        subset: points of a step before the last phase, which takes all.
+        distortion: "conformal" or "isometric".
+        distortion_weight: its weight; the paper's text has 1e-4 for complex shapes.
+        eigenvalues: "singular" or "gram", the readings of "the eigenvalues of the Jacobian".
+        branches: "both", or an ablation: "3d" (3D→2D→3D alone) or "2d" (2D→3D→2D alone).
+        seed: of every random draw.
+        device: "auto", "cpu" or "cuda".
+        threads: of the processor, None as torch has it.
+        preset_: the numbers of the run, a `Preset`.
+        points_: (n, 3) training points.
+        networks_: the trained networks.
+        centre_, scale_: the points minus `centre_`, over `scale_`, are what the networks see.
+        trace_: losses over the run.
+        report_: settings, final losses, time and device of the run.
+    """
+
+    requires: ClassVar[frozenset[str]] = frozenset()
+
+    preset: str = "fast"
+    points: int | None = None
+    iterations: int | None = None
+    time_budget: float | None = None
+    subset: int | None = None
+    distortion: str | None = None
+    distortion_weight: float | None = None
+    eigenvalues: str | None = None
+    branches: str | None = None
+    seed: int = 0
+    device: str = "auto"
+    threads: int | None = None
+
+    def get_params(self, deep: bool = True) -> dict[str, Any]:  # noqa: ARG002 (scikit-learn's name)
+        """The parameters by name."""
+        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+
+    def set_params(self, **parameters: Any) -> Self:
+        """Set parameters by name.
+
+        Raises:
+            InputError: there is no such parameter.
+        """
+        known = self.get_params()
+        for name, value in parameters.items():
+            if name not in known:
+                raise InputError(f"no parameter {name!r}; there are: {', '.join(known)}")
+            setattr(self, name, value)
+        return self
+
+    def fit(
+        self,
+        points: npt.ArrayLike | Surface,
+        y: None = None,  # noqa: ARG002 (scikit-learn's pipelines pass it)
+        *,
+        checkpoint: str | Path | None = None,
+        callback: Callable[[Progress], None] | None = None,
+    ) -> Self:
+        """Learn the map of a surface.
+
+        Args:
+            points: (N, 3) coordinates, a PointCloud, or a Mesh (its vertices, or points on its
+                faces where they are few). Rows that are not finite are left out. Units are free.
+            y: not used.
+            checkpoint: folder where the state is saved each minute. A fit that finds the state of
+                the same run there goes on from it; at the end the state is removed.
+            callback: called after each step.
+
+        Raises:
+            InputError: a parameter is not as said, there are fewer than 100 distinct points, or
+                they lie on a line; the checkpoint is of another run or version.
+            DivergedError: the training diverged, and again with a smaller step.
+        """
+        return self._fit(points, None, checkpoint, callback)
+
+    def transform(self, points: npt.ArrayLike | Surface) -> FloatArray:
+        """(N, 2) coordinates in the plane of (N, 3) points on the surface, in the points' unit.
+
+        Any number of points: they are mapped in batches, which bounds the memory.
+
+        Raises:
+            InputError: the points have another shape or are not finite, or nothing is fitted.
+        """
+        self._check_fitted()
+        at = _coordinates(points, 3)
+        uv: FloatArray = np.empty((len(at), 2))
+        with self._mapping() as (batch, device):
+            for rows in _slices(len(at), batch):
+                x = torch.from_numpy((at[rows] - self.centre_) / self.scale_).float().to(device)
+                uv[rows] = self.networks_.parameterization(x).cpu().numpy()
+        return uv * self.scale_
+
+    def inverse_transform(self, uv: npt.ArrayLike) -> FloatArray:
+        """(N, 3) points on the surface at (N, 2) coordinates of `transform`.
+
+        Raises:
+            InputError: the coordinates have another shape or are not finite, or nothing is fitted.
+        """
+        self._check_fitted()
+        at = _coordinates(uv, 2)
+        points: FloatArray = np.empty((len(at), 3))
+        with self._mapping() as (batch, device):
+            for rows in _slices(len(at), batch):
+                x = torch.from_numpy(at[rows] / self.scale_).float().to(device)
+                points[rows] = self.networks_.surface(x).cpu().numpy()
+        return np.asarray(points * self.scale_ + self.centre_)
+
+    def seams(self, points: npt.ArrayLike | Surface | None = None) -> BoolArray:
+        """(N,) whether each point lies on a cutting seam (paper, eq. "find-cut").
+
+        It does where one of its K_cut = 3 nearest points in space is farther from it in the plane
+        than T_cut = 1 % of the side of the map's square bounding box.
+
+        Args:
+            points: (N, 3) points; the training points by default.
+
+        Raises:
+            InputError: the points are not as said, fewer than four, or nothing is fitted.
+        """
+        self._check_fitted()
+        at = self.points_ if points is None else _coordinates(points, 3)
+        count = self.preset_.seam_neighbours
+        if len(at) <= count:
+            raise InputError(f"seams need more than {count} points, not {len(at)}")
+        uv = self.transform(at)
+        near = cKDTree(at).query(at, count + 1, workers=-1)[1][:, 1:]
+        apart = np.max([np.linalg.norm(uv - uv[near[:, k]], axis=1) for k in range(count)], axis=0)
+        side = np.ptp(uv, axis=0).max()
+        return np.asarray(apart > self.preset_.seam_threshold * side)
+
+    def parameterize(
+        self, surface: Surface, *, seed: int
+    ) -> Parameterization | PointParameterization:
+        """Fit a copy of this model to a surface and map it; see `Method`.
+
+        A mesh gets one uv for each vertex, so faces across a learned seam span it. The trace has
+        the losses and some maps along the way.
+
+        Raises:
+            InputError: see `fit`.
+        """
+        model = dataclasses.replace(self, seed=seed)
+        vertices = _coordinates(surface, 3)
+        watched = vertices if len(vertices) <= MOST_KEPT_ROWS else None
+        model._fit(surface, watched, None, None)  # noqa: SLF001 (a copy of this one)
+        uv = model.transform(vertices)
+        if isinstance(surface, Mesh):
+            return Parameterization(uv, surface.faces, model.trace_, model.report_)
+        return PointParameterization(uv, model.trace_, model.report_)
+
+    def save(self, folder: str | Path) -> None:
+        """Write the fitted model to `folder`: `model.json` and the tensors that it names.
+
+        Raises:
+            InputError: nothing is fitted.
+        """
+        self._check_fitted()
+        tensors = dict(self.networks_.state_dict())
+        facts = {
+            "parameters": self.get_params(),
+            "preset": dataclasses.asdict(self.preset_),
+            "centre": self.centre_.tolist(),
+            "scale": self.scale_,
+            "report": self.report_,
+            "trace": [[t.iteration, t.seconds, dict(t.values)] for t in self.trace_],
+        }
+        _write(Path(folder), "model", {**tensors, "points": torch.from_numpy(self.points_)}, facts)
+
+    @classmethod
+    def load(cls, folder: str | Path, *, device: str = "auto") -> Self:
+        """The model that `save` wrote to `folder`.
+
+        Raises:
+            InputError: there is none, it is damaged, or of another version of the format.
+        """
+        tensors, facts = _read(Path(folder), "model")
+        with _damage_of(Path(folder)):
+            model = cls(**{**facts["parameters"], "device": device})
+            model.preset_ = _preset_from(facts["preset"])
+            model.points_ = tensors.pop("points").numpy()
+            model.networks_ = _networks(model.preset_)
+            model.networks_.load_state_dict(tensors)
+            model.centre_ = np.array(facts["centre"])
+            model.scale_ = float(facts["scale"])
+            model.report_ = facts["report"]
+            model.trace_ = tuple(TracePoint(*row) for row in facts["trace"])
+        model.networks_.to(_device(device))
+        return model
+
+    def _fit(
+        self,
+        surface: npt.ArrayLike | Surface,
+        watched: FloatArray | None,
+        checkpoint: str | Path | None,
+        callback: Callable[[Progress], None] | None,
+    ) -> Self:
+        """`fit`; the trace gets maps of the points `watched`."""
+        preset, device = self._checked()
+        self.preset_ = preset
+        self.points_ = training_points(surface, preset.points, self.seed)
+        low, high = self.points_.min(axis=0), self.points_.max(axis=0)
+        self.centre_ = (low + high) / 2
+        self.scale_ = float(np.linalg.norm(self.points_ - self.centre_, axis=1).max())
+        with _threads(self.threads):
+            trainer = Trainer(
+                (self.points_ - self.centre_) / self.scale_,
+                preset,
+                seed=self.seed,
+                device=device,
+                time_budget=self.time_budget,
+            )
+            self.networks_ = trainer.networks
+            self.trace_: tuple[TracePoint, ...] = ()
+            store = None if checkpoint is None else _Checkpoint(Path(checkpoint), self._identity())
+            if store is not None and (found := store.read()) is not None:
+                tensors, facts = found
+                trainer.resume(tensors, facts["trainer"])
+                self.trace_ = tuple(TracePoint(*row) for row in facts["trace"])
+            begun = time.monotonic() - trainer.seconds
+            for step in trainer.run():
+                if step.losses:
+                    self._record(step, watched)
+                if store is not None:
+                    store.write_each_minute(trainer, self.trace_)
+                if callback is not None:
+                    left = step.seconds * (1 - step.progress) / step.progress
+                    callback(Progress(step, left))
+        if store is not None:
+            store.remove()
+        self.report_ = self._report(trainer, device, time.monotonic() - begun)
+        if trainer.divergences:
+            logger.warning("training diverged once and went on with a smaller step")
+        return self
+
+    def _record(self, step: Step, watched: FloatArray | None) -> None:
+        """Append a step to the trace, with a map of the points watched where one is due."""
+        kept = sum(point.uv is not None for point in self.trace_)
+        is_due = watched is not None and step.progress * KEPT_MAPS >= kept + 1
+        uv = self.transform(watched) if is_due and watched is not None else None
+        point = TracePoint(step.iteration, step.seconds, step.losses, uv)
+        self.trace_ = (*self.trace_, point)
+
+    def _report(self, trainer: Trainer, device: str, seconds: float) -> dict[str, object]:
+        preset = self.preset_
+        return {
+            "preset": self.preset,
+            "points": len(self.points_),
+            "points_of_a_step": min(preset.subset, len(self.points_)),
+            "iterations": trainer.iteration,
+            "warm_up": preset.warm_up,
+            "weights": trainer.weights,
+            "distortion": preset.distortion,
+            "eigenvalues": preset.eigenvalues,
+            "branches": preset.branches,
+            "losses": dict(self.trace_[-1].values) if self.trace_ else {},
+            "divergences": trainer.divergences,
+            "seconds": round(seconds, 3),
+            "device": device,
+            "threads": self.threads or torch.get_num_threads(),
+        }
+
+    def _checked(self) -> tuple[Preset, str]:
+        """The preset with this model's parameters in it, and the device.
+
+        Raises:
+            InputError: a parameter is not as said.
+        """
+        if self.preset not in PRESETS:
+            raise InputError(f"no preset {self.preset!r}; there are: {', '.join(PRESETS)}")
+        for name, least in (
+            ("points", FEWEST_POINTS),
+            ("iterations", 1),
+            ("subset", FEWEST_POINTS),
+            ("threads", 1),
+        ):
+            value = getattr(self, name)
+            if value is not None and not (isinstance(value, int) and value >= least):
+                raise InputError(f"{name} must be a whole number of at least {least}, not {value}")
+        for name, choices in (
+            ("distortion", DISTORTIONS),
+            ("eigenvalues", EIGENVALUES),
+            ("branches", ("both", "3d", "2d")),
+        ):
+            value = getattr(self, name)
+            if value is not None and value not in choices:
+                raise InputError(f"{name} must be one of {', '.join(choices)}, not {value!r}")
+        if self.time_budget is not None and not 0 < self.time_budget < math.inf:
+            raise InputError(f"time_budget must be a number of seconds, not {self.time_budget}")
+        weight = self.distortion_weight
+        if weight is not None and not 0 <= weight < math.inf:
+            raise InputError(f"distortion_weight must be a number of at least 0, not {weight}")
+        if not isinstance(self.seed, int) or self.seed < 0:
+            raise InputError(f"seed must be a whole number of at least 0, not {self.seed}")
+        own = {field.name for field in dataclasses.fields(Preset)}
+        given = {k: v for k, v in self.get_params().items() if k in own and v is not None}
+        return dataclasses.replace(PRESETS[self.preset], **given), _device(self.device)
+
+    def _identity(self) -> str:
+        """What a checkpoint must agree on with the run that goes on from it."""
+        facts = [dataclasses.asdict(self.preset_), self.seed, self.time_budget]
+        text = json.dumps(facts).encode() + self.points_.tobytes()
+        return hashlib.sha256(text).hexdigest()
+
+    def _check_fitted(self) -> None:
+        if not hasattr(self, "networks_"):
+            raise InputError("this model is not fitted; call fit or load first")
+
+    @contextmanager
+    def _mapping(self) -> Iterator[tuple[int, torch.device]]:
+        """No gradients, this model's threads; gives the batch size and the networks' device."""
+        device = next(self.networks_.parameters()).device
+        with torch.no_grad(), _threads(self.threads):
+            yield BATCH[device.type], device
+
+
+def training_points(surface: npt.ArrayLike | Surface, count: int, seed: int) -> FloatArray:
+    """(n, 3) distinct training points: at most `count`, drawn evenly without repetition.
+
+    Of a cloud, from its points; of a mesh, from the vertices of its faces, or from the faces by
+    area where it has fewer than 2,000 vertices.
+
+    Raises:
+        InputError: fewer than 100 distinct points, or all on a line.
+    """
+    rng = np.random.default_rng(seed)
+    if isinstance(surface, Mesh):
+        points = surface.vertices[surface.referenced]
+        if len(points) < FEWEST_VERTICES and surface.face_areas.sum() > 0:
+            points = surface_sample(surface.vertices, surface.faces, count, seed)
+    else:
+        points = surface.points if isinstance(surface, PointCloud) else _finite_rows(surface)
+    if len(points) > 10 * count:
+        # Repetitions are looked for in a part: sorting millions of rows takes long.
+        points = points[np.sort(rng.choice(len(points), 10 * count, replace=False))]
+    distinct = np.unique(points, axis=0)
+    if len(distinct) < FEWEST_POINTS:
+        raise InputError(f"{len(distinct)} distinct points; a fit needs at least {FEWEST_POINTS}")
+    spread = np.linalg.svd(distinct - distinct.mean(axis=0), compute_uv=False)
+    if spread[1] <= 1e-6 * spread[0]:
+        raise InputError("all points lie on a line; a fit needs points of a surface")
+    if len(distinct) > count:
+        distinct = distinct[np.sort(rng.choice(len(distinct), count, replace=False))]
+    return np.ascontiguousarray(distinct)
+
+
+def _finite_rows(values: npt.ArrayLike) -> FloatArray:
+    """(N, 3) coordinates without the rows that are not finite, whose number is logged."""
+    points = np.asarray(values, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise InputError(f"points must have shape (n, 3), not {points.shape}")
+    finite = np.isfinite(points).all(axis=1)
+    if not finite.all():
+        logger.warning("dropped %d of %d points: not finite", (~finite).sum(), len(points))
+    return points[finite]
+
+
+def _coordinates(values: npt.ArrayLike | Surface, columns: int) -> FloatArray:
+    """The (N, columns) finite coordinates of a surface or an array."""
+    if isinstance(values, Mesh):
+        return values.vertices
+    if isinstance(values, PointCloud):
+        return values.points
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim != 2 or array.shape[1] != columns or not np.isfinite(array).all():
+        raise InputError(f"coordinates must be finite and of shape (n, {columns})")
+    return array
+
+
+def _slices(count: int, batch: int) -> Iterator[slice]:
+    return (slice(begin, begin + batch) for begin in range(0, count, batch))
+
+
+@contextmanager
+def _threads(count: int | None) -> Iterator[None]:
+    """Torch on this many threads, and as before afterwards."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(count or before)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
+def _device(name: str) -> str:
+    """The device of a name: "auto" is CUDA where there is any."""
+    if name not in ("auto", "cpu", "cuda"):
+        raise InputError(f"device must be auto, cpu or cuda, not {name!r}")
+    available = torch.cuda.is_available()
+    if name == "cuda" and not available:
+        raise InputError("device cuda: none is available; take auto or cpu")
+    return "cuda" if available and name != "cpu" else "cpu"
+
+
+def _networks(preset: Preset) -> Networks:
+    """Networks of a preset, about to be filled with saved weights."""
+    activation = ACTIVATIONS[preset.activation]
+    return Networks(preset.hidden, preset.embedding, activation, torch.Generator())
+
+
+def _preset_from(facts: dict[str, Any]) -> Preset:
+    """A preset from JSON, where tuples are lists."""
+    return Preset(**{**facts, "hidden": tuple(facts["hidden"])})
+
+
+def _write(folder: Path, stem: str, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
+    """Write `stem.json` and the tensors it names, so that a kill leaves the old pair or the new."""
+    folder.mkdir(parents=True, exist_ok=True)
+    data = safetensors.torch.save({k: t.contiguous().cpu() for k, t in tensors.items()})
+    name = f"{stem}-{hashlib.sha256(data).hexdigest()[:16]}.safetensors"
+    text = json.dumps({"format": FORMAT, "tensors": name, **facts}, indent=1)
+    for path, content in ((folder / name, data), (folder / f"{stem}.json", text.encode())):
+        temporary = path.with_name(path.name + ".part")
+        temporary.write_bytes(content)
+        temporary.replace(path)
+    for old in folder.glob(f"{stem}-*.safetensors"):
+        if old.name != name:
+            old.unlink()
+
+
+def _read(folder: Path, stem: str) -> tuple[dict[str, Tensor], dict[str, Any]]:
+    """What `_write` wrote.
+
+    Raises:
+        InputError: there is no such pair, it is damaged, or of another version.
+    """
+    path = folder / f"{stem}.json"
+    if not path.is_file():
+        raise InputError(f"{folder}: no saved model here ({stem}.json is missing)")
+    with _damage_of(folder):
+        facts = json.loads(path.read_text())
+        version = facts["format"]
+    if version != FORMAT:
+        raise InputError(
+            f"{path}: format version {version}; this parapoint reads version {FORMAT}: fit anew"
+        )
+    with _damage_of(folder):
+        return safetensors.torch.load((folder / facts["tensors"]).read_bytes()), facts
+
+
+@contextmanager
+def _damage_of(folder: Path) -> Iterator[None]:
+    """Turns what a damaged file causes into an InputError that names the folder."""
+    try:
+        yield
+    except (
+        KeyError,
+        TypeError,
+        ValueError,
+        OSError,
+        RuntimeError,
+        safetensors.SafetensorError,
+    ) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{folder}: damaged, fit anew or delete it ({error})") from error
+
+
+class _Checkpoint:
+    """The state of a run in a folder, written each minute."""
+
+    def __init__(self, folder: Path, identity: str) -> None:
+        self.folder, self.identity = folder, identity
+        self.written = time.monotonic()
+
+    def read(self) -> tuple[dict[str, Tensor], dict[str, Any]] | None:
+        """The state of an earlier session of this run, None where there is none.
+
+        Raises:
+            InputError: the state is of another run, of another version, or damaged.
+        """
+        if not (self.folder / "checkpoint.json").is_file():
+            return None
+        tensors, facts = _read(self.folder, "checkpoint")
+        if facts.get("identity") != self.identity:
+            raise InputError(
+                f"{self.folder}: holds the checkpoint of a run with other points or settings; "
+                "delete it or choose another folder"
+            )
+        return tensors, facts
+
+    def write_each_minute(self, trainer: Trainer, trace: tuple[TracePoint, ...]) -> None:
+        """Write the state if the last one is a minute old. Maps in the trace are not kept."""
+        if time.monotonic() - self.written < CHECKPOINT_SECONDS:
+            return
+        facts = {
+            "identity": self.identity,
+            "trainer": trainer.facts(),
+            "trace": [[t.iteration, t.seconds, dict(t.values)] for t in trace],
+        }
+        _write(self.folder, "checkpoint", trainer.tensors(), facts)
+        self.written = time.monotonic()
+
+    def remove(self) -> None:
+        """Remove the state: the run is done."""
+        for path in self.folder.glob("checkpoint*"):
+            path.unlink()

@@ -1,0 +1,276 @@
+"""The five sub-networks and the two cycle branches they are assembled into.
+
+Every network maps tensors of shape (1 + T, N, C): entry 0 holds N points of C channels, entries
+1 to T hold tangents at these points, which are pushed forward beside them (forward-mode
+derivatives). Points and tangents go through one matrix product: a linear layer maps a tangent t to
+W t, an activation multiplies it by its slope at the point. So a Jacobian costs as much as its
+columns, and the loss that is put on it needs no second backward pass.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+import torch
+from torch import Tensor, nn
+
+
+class Activation(Protocol):
+    """A nonlinearity, applied to points and tangents in place."""
+
+    def push_(self, z: Tensor) -> None:
+        """(1 + T, N, C) pre-activations, overwritten: points by σ(z), tangents t by σ'(z) t."""
+        ...
+
+    def pull_(self, gradient: Tensor, h: Tensor) -> None:
+        """(1 + T, N, C) gradient at what `push_` left in `h`, overwritten by the one at z."""
+        ...
+
+
+@dataclass(frozen=True)
+class LeakyReLU:
+    """max(z, slope z), as the paper has it (slope 0.01); piecewise linear, so σ'' = 0."""
+
+    slope: float = 0.01
+
+    def push_(self, z: Tensor) -> None:
+        """See `Activation`."""
+        nn.functional.leaky_relu_(z[0], self.slope)
+        if len(z) > 1:
+            self.pull_(z[1:], z[:1])
+
+    def pull_(self, gradient: Tensor, h: Tensor) -> None:
+        """See `Activation`. The sign of σ(z) is the sign of z, so the slope is known from h."""
+        torch.ops.aten.leaky_relu_backward.grad_input(
+            gradient, h[:1].expand_as(gradient), self.slope, True, grad_input=gradient
+        )
+
+
+@dataclass(frozen=True)
+class Softplus:
+    """log(1 + exp(sharpness z)) / sharpness: smooth, so that Jacobians vary with the point."""
+
+    sharpness: float = 10.0
+
+    def push_(self, z: Tensor) -> None:
+        """See `Activation`."""
+        slope = torch.sigmoid(self.sharpness * z[0])
+        z[0] = nn.functional.softplus(z[0], self.sharpness)
+        z[1:] *= slope
+
+    def pull_(self, gradient: Tensor, h: Tensor) -> None:
+        """See `Activation`. With σ' = 1 - exp(-sharpness σ) and σ'' / σ' = sharpness (1 - σ')."""
+        rest = torch.exp(-self.sharpness * h[0])
+        bend = (gradient[1:] * h[1:]).sum(0).mul_(self.sharpness).mul_(rest)
+        gradient *= 1 - rest
+        gradient[0] += bend
+
+
+ACTIVATIONS: dict[str, Activation] = {"leaky_relu": LeakyReLU(), "softplus": Softplus()}
+"""What `Preset.activation` may name."""
+
+
+class _StackFunction(torch.autograd.Function):
+    """A stack of linear layers with its backward pass written out: elementwise work in place."""
+
+    @staticmethod
+    def forward(ctx: Any, x: Tensor, activation: Activation, *parameters: Tensor) -> Tensor:
+        weights, biases = parameters[::2], parameters[1::2]
+        inputs: list[Tensor] = []
+        z = x.contiguous()
+        for weight, bias in zip(weights, biases, strict=True):
+            if inputs:
+                activation.push_(z)
+            inputs.append(z)
+            z = z @ weight.t()
+            z[0] += bias
+        ctx.activation = activation
+        ctx.save_for_backward(*weights, *inputs)
+        return z
+
+    @staticmethod
+    @torch.autograd.function.once_differentiable
+    def backward(ctx: Any, output_gradient: Tensor) -> tuple[Tensor | None, ...]:
+        layers = len(ctx.saved_tensors) // 2
+        weights, inputs = ctx.saved_tensors[:layers], ctx.saved_tensors[layers:]
+        of_parameters: list[Tensor] = []
+        gradient = output_gradient.contiguous()
+        for weight, h in zip(reversed(weights), reversed(inputs), strict=True):
+            of_parameters += [gradient[0].sum(0), gradient.flatten(0, 1).t() @ h.flatten(0, 1)]
+            is_first = len(of_parameters) == 2 * layers
+            if is_first and not ctx.needs_input_grad[0]:
+                return None, None, *reversed(of_parameters)
+            gradient = gradient @ weight
+            if not is_first:
+                ctx.activation.pull_(gradient, h)
+        return gradient, None, *reversed(of_parameters)
+
+
+class Stack(nn.Module):
+    """Φ(inputs → outputs): linear layers, an activation between them, none after the last.
+
+    Weights and biases start uniform within ±1 / √(inputs of the layer), torch's own default.
+    """
+
+    def __init__(
+        self,
+        inputs: int,
+        outputs: int,
+        hidden: tuple[int, ...],
+        activation: Activation,
+        generator: torch.Generator,
+    ) -> None:
+        super().__init__()
+        self.layers = nn.ParameterList()
+        for before, after in itertools.pairwise((inputs, *hidden, outputs)):
+            for shape in ((after, before), (after,)):
+                uniform = 2 * torch.rand(shape, generator=generator) - 1
+                self.layers.append(nn.Parameter(uniform / before**0.5))
+        self.activation = activation
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(1 + T, N, inputs) points and tangents → (1 + T, N, outputs)."""
+        output: Tensor = _StackFunction.apply(x, self.activation, *self.layers)  # type: ignore[no-untyped-call]
+        return output
+
+
+class OffsetStack(nn.Module):
+    """x + Φ([Φ(x); x]): an embedding beside the point itself, then an offset of the point."""
+
+    def __init__(
+        self,
+        channels: int,
+        embedding: int,
+        hidden: tuple[int, ...],
+        activation: Activation,
+        generator: torch.Generator,
+    ) -> None:
+        super().__init__()
+        self.embed = Stack(channels, embedding, hidden, activation, generator)
+        self.offset = Stack(embedding + channels, channels, hidden, activation, generator)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(1 + T, N, channels) points and tangents → the same shape."""
+        offset: Tensor = self.offset(torch.cat([self.embed(x), x], dim=2))
+        return x + offset
+
+
+class PointBranch(NamedTuple):
+    """3D→2D→3D: the cloud P, opened, flattened and brought back.
+
+    Attributes:
+        points: P (N, 3).
+        cut: S = Cut(P) (N, 3).
+        uv: Q = Unwrap(S) (N, 2), the parameterization.
+        cut_cycle: Wrap(Q) (N, 3).
+        points_cycle: Stitch(Wrap(Q)) = f(Q) (N, 3).
+        tangents: f_u and f_v at Q (2, N, 3).
+    """
+
+    points: Tensor
+    cut: Tensor
+    uv: Tensor
+    cut_cycle: Tensor
+    points_cycle: Tensor
+    tangents: Tensor
+
+
+class GridBranch(NamedTuple):
+    """2D→3D→2D: the deformed lattice, wrapped, stitched and brought back.
+
+    Attributes:
+        uv: Q̂ = Deform(G) (M, 2).
+        cut: Ŝ = Wrap(Q̂) (M, 3).
+        points: P̂ = Stitch(Ŝ) = g(Q̂) (M, 3).
+        tangents: g_u and g_v at Q̂ (2, M, 3).
+        cut_cycle: Cut(P̂) (M, 3).
+        uv_cycle: Unwrap(Cut(P̂)) (M, 2).
+    """
+
+    uv: Tensor
+    cut: Tensor
+    points: Tensor
+    tangents: Tensor
+    cut_cycle: Tensor
+    uv_cycle: Tensor
+
+
+class Cycle(NamedTuple):
+    """Both branches; None where one is left out (the paper's ablation)."""
+
+    point: PointBranch | None
+    grid: GridBranch | None
+
+
+class Networks(nn.Module):
+    """Deform, Cut, Stitch, Wrap and Unwrap (paper, section 3.2), with the maps made of them."""
+
+    def __init__(
+        self,
+        hidden: tuple[int, ...],
+        embedding: int,
+        activation: Activation,
+        generator: torch.Generator,
+    ) -> None:
+        super().__init__()
+        self.deform = OffsetStack(2, embedding, hidden, activation, generator)
+        self.cut = OffsetStack(3, embedding, hidden, activation, generator)
+        self.stitch = Stack(3, 3, hidden, activation, generator)
+        self.wrap = Stack(2, 3, hidden, activation, generator)
+        self.unwrap = Stack(3, 2, hidden, activation, generator)
+
+    def forward(self, points: Tensor | None, grid: Tensor | None) -> Cycle:
+        """Both branches at points P (N, 3) and lattice G (M, 2); None leaves a branch out.
+
+        Both go through Wrap and Stitch, the only networks with tangents, together.
+        """
+        wrapped = []
+        if points is not None:
+            cut = self.cut(points[None])
+            wrapped.append(self.unwrap(cut)[0])
+        if grid is not None:
+            wrapped.append(self.deform(grid[None])[0])
+        uv = torch.cat(wrapped)
+        axes = torch.eye(2, dtype=uv.dtype, device=uv.device)[:, None].expand(2, len(uv), 2)
+        opened = self.wrap(torch.cat([uv[None], axes]))
+        closed = self.stitch(opened)
+        count = 0 if points is None else len(points)
+        point_branch = grid_branch = None
+        if points is not None:
+            point_branch = PointBranch(
+                points, cut[0], uv[:count], opened[0, :count], closed[0, :count], closed[1:, :count]
+            )
+        if grid is not None:
+            on_shape = closed[0, count:]
+            reopened = self.cut(on_shape[None])
+            flattened = self.unwrap(reopened)[0]
+            grid_branch = GridBranch(
+                uv[count:], opened[0, count:], on_shape, closed[1:, count:], reopened[0], flattened
+            )
+        return Cycle(point_branch, grid_branch)
+
+    def parameterization(self, points: Tensor) -> Tensor:
+        """Q = Unwrap(Cut(P)): (N, 3) → (N, 2)."""
+        uv: Tensor = self.unwrap(self.cut(points[None]))[0]
+        return uv
+
+    def surface(self, uv: Tensor) -> Tensor:
+        """f(Q) = Stitch(Wrap(Q)): (N, 2) → (N, 3)."""
+        points: Tensor = self.stitch(self.wrap(uv[None]))[0]
+        return points
+
+
+def products(networks: Networks) -> tuple[int, int]:
+    """Multiply-adds for one point of the point branch and one of the grid branch, forward alone.
+
+    Tangents count as two more points. A backward pass does twice the work of the forward one.
+    """
+    cost = {
+        name: sum(p.numel() for p in child.parameters() if p.ndim == 2)
+        for name, child in networks.named_children()
+    }
+    there = cost["cut"] + cost["unwrap"]
+    back = 3 * (cost["wrap"] + cost["stitch"])
+    return there + back, cost["deform"] + back + there

@@ -1,0 +1,350 @@
+"""Training: the hull warm-up, the schedule, the loop, divergence, the state that is saved."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from copy import deepcopy
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from scipy.spatial import ConvexHull, QhullError, cKDTree
+from torch import Tensor
+
+from parapoint import losses
+from parapoint.networks import ACTIVATIONS, Cycle, Networks
+from parapoint.presets import Preset
+from parapoint.surface import FloatArray
+
+SNAPSHOTS = 100
+"""States kept in a run, evenly: the last good one is where a diverged run begins again."""
+DIVERGED = 10.0
+"""A mean loss this many times the phase's lowest has diverged."""
+SMALLER_STEP = 0.3
+"""Factor on the learning rate after a divergence."""
+
+
+class DivergedError(RuntimeError):
+    """Training diverged twice, the second time with a smaller step, before any usable state."""
+
+
+class Step(NamedTuple):
+    """Where a run is.
+
+    Attributes:
+        iteration: steps done.
+        progress: share of the run that is done, in [0, 1].
+        seconds: time spent in training, earlier sessions of a resumed run included.
+        phase: "hull", "subset" or "all".
+        losses: at a snapshot, the mean of each unweighted term and of the weighted "total" since
+            the one before; empty at other steps.
+    """
+
+    iteration: int
+    progress: float
+    seconds: float
+    phase: str
+    losses: dict[str, float]
+
+
+class AdamW:
+    """Adam with decoupled weight decay (Loshchilov and Hutter 2019, algorithm 2).
+
+    The same as `torch.optim.AdamW` with its defaults, whose first use takes two seconds of imports.
+    """
+
+    BETAS = (0.9, 0.999)
+
+    def __init__(self, parameters: list[Tensor], weight_decay: float) -> None:
+        self.parameters, self.weight_decay = parameters, weight_decay
+        self.steps = torch.zeros((), dtype=torch.int64)
+        self.first = [torch.zeros_like(p) for p in parameters]
+        self.second = [torch.zeros_like(p) for p in parameters]
+
+    @torch.no_grad()
+    def step(self, learning_rate: float) -> None:
+        """Move the parameters along their gradients, and drop these."""
+        active = [i for i, p in enumerate(self.parameters) if p.grad is not None]
+        parameters = [self.parameters[i] for i in active]
+        gradients = [p.grad for p in parameters if p.grad is not None]
+        first, second = [self.first[i] for i in active], [self.second[i] for i in active]
+        self.steps += 1
+        of_first, of_second = (1 - beta ** int(self.steps) for beta in self.BETAS)
+        torch._foreach_lerp_(first, gradients, 1 - self.BETAS[0])
+        torch._foreach_mul_(second, self.BETAS[1])
+        torch._foreach_addcmul_(second, gradients, gradients, 1 - self.BETAS[1])
+        scale = torch._foreach_div(second, of_second)  # noqa: SLF001 (torch.optim uses the same)
+        torch._foreach_sqrt_(scale)
+        torch._foreach_add_(scale, 1e-8)
+        torch._foreach_mul_(parameters, 1 - learning_rate * self.weight_decay)
+        torch._foreach_addcdiv_(parameters, first, scale, -learning_rate / of_first)
+        for parameter in parameters:
+            parameter.grad = None
+
+    def state(self) -> dict[str, Tensor]:
+        """The moments by name, not copied."""
+        moments = {"first": self.first, "second": self.second}
+        named = {f"{name}.{i}": t for name, of in moments.items() for i, t in enumerate(of)}
+        return {"steps": self.steps, **named}
+
+    def restore(self, state: dict[str, Tensor]) -> None:
+        """Copy in what `state` returned."""
+        for name, tensor in self.state().items():
+            tensor.copy_(state[name])
+
+
+_FACTS = (
+    "iteration",
+    "seconds",
+    "divergences",
+    "_phase_now",
+    "_lowest",
+    "_next_snapshot",
+    "_sums",
+    "_count",
+)
+"""Attributes of a Trainer that a checkpoint keeps."""
+
+
+def _under(prefix: str, tensors: dict[str, Tensor]) -> dict[str, Tensor]:
+    """The tensors whose names begin with `prefix`, without it."""
+    return {name[len(prefix) :]: t for name, t in tensors.items() if name.startswith(prefix)}
+
+
+class Trainer:
+    """Fits the networks to one cloud.
+
+    Args:
+        points: (N, 3) float32, centred, largest norm 1.
+        preset: every number of the run.
+        seed: of all random draws: initial weights, subsets, perturbations.
+        device: "cpu" or "cuda".
+        time_budget: seconds after which the run ends; the schedule follows the time where that
+            comes before the preset's number of iterations.
+    """
+
+    def __init__(
+        self,
+        points: FloatArray,
+        preset: Preset,
+        *,
+        seed: int,
+        device: str,
+        time_budget: float | None = None,
+    ) -> None:
+        self.preset, self.time_budget = preset, time_budget
+        self.generator = torch.Generator().manual_seed(seed)
+        self.networks = Networks(
+            preset.hidden,
+            preset.embedding,
+            ACTIVATIONS[preset.activation],
+            self.generator,
+        ).to(device)
+        self.optimizer = AdamW(list(self.networks.parameters()), preset.weight_decay)
+        self.shape = torch.as_tensor(points, dtype=torch.float32)
+        self.hull = torch.as_tensor(hull_sample(points, len(points), seed), dtype=torch.float32)
+        self.noise = preset.perturbation * mean_spacing(points)
+        self.device = device
+        self.iteration = 0
+        self.seconds = 0.0
+        self.divergences = 0
+        self._phase_now = ""
+        self._lowest = math.inf
+        self._next_snapshot = 1 / SNAPSHOTS
+        self._sums: dict[str, float] = {}
+        self._count = 0
+        self._good = deepcopy(self._state())
+
+    @property
+    def weights(self) -> dict[str, float]:
+        """The weight of each term of the objective."""
+        names = ("unwrap", "wrap", "cycle", "distortion", "anti_flip")
+        return {name: getattr(self.preset, f"{name}_weight") for name in names}
+
+    @property
+    def progress(self) -> float:
+        """Share of the run that is done, by iterations or by time, whichever is ahead."""
+        by_time = 0.0 if self.time_budget is None else self.seconds / self.time_budget
+        return min(1.0, max(self.iteration / self.preset.iterations, by_time))
+
+    def run(self) -> Iterator[Step]:
+        """Train to the end, a `Step` for each iteration; leave the networks at the best state.
+
+        Best: the lowest mean loss between two snapshots of the last phase (losses of different
+        phases do not compare: the Chamfer distance falls with the number of points).
+
+        Raises:
+            DivergedError: the loss blew up twice.
+        """
+        longest = 0.0
+        while self.progress < 1 and self._fits(longest):
+            begin = time.perf_counter()
+            phase = self._phase()
+            if phase != self._phase_now:
+                self._phase_now, self._lowest, longest = phase, math.inf, 0.0
+                self._sums, self._count = {}, 0
+            for name, value in self._step().items():
+                self._sums[name] = self._sums.get(name, 0.0) + value
+            self._count += 1
+            self.iteration += 1
+            spent = time.perf_counter() - begin
+            longest = max(longest, spent)
+            self.seconds += spent
+            means: dict[str, float] = {}
+            ends_phase = self.progress == 1 or self._phase() != phase
+            if ends_phase or self.progress >= self._next_snapshot:
+                means = {name: total / self._count for name, total in self._sums.items()}
+                self._snapshot(means["total"])
+            yield Step(self.iteration, self.progress, self.seconds, phase, means)
+        self._restore(self._good)
+
+    def tensors(self) -> dict[str, Tensor]:
+        """What a checkpoint holds as tensors: this state, the last good one, the generator."""
+        kept = {"now": self._state(), "good": self._good}
+        return {
+            "generator": self.generator.get_state(),
+            **{f"{key}.{name}": t for key, state in kept.items() for name, t in state.items()},
+        }
+
+    def facts(self) -> dict[str, Any]:
+        """What a checkpoint holds as JSON."""
+        return {name: getattr(self, name) for name in _FACTS}
+
+    def resume(self, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
+        """Go on from what `tensors` and `facts` returned in an earlier process."""
+        self.generator.set_state(tensors["generator"])
+        self._restore(_under("now.", tensors))
+        self._good = _under("good.", tensors)
+        for name in _FACTS:
+            setattr(self, name, facts[name])
+
+    def _state(self) -> dict[str, Tensor]:
+        """Weights and optimiser state by name, not copied."""
+        kept = {"networks": self.networks.state_dict(), "optimizer": self.optimizer.state()}
+        return {f"{key}.{name}": t for key, state in kept.items() for name, t in state.items()}
+
+    def _restore(self, state: dict[str, Tensor]) -> None:
+        """Load a copy of what `_state` returned."""
+        self.networks.load_state_dict(_under("networks.", state))
+        self.optimizer.restore(_under("optimizer.", state))
+
+    def _snapshot(self, total: float) -> None:
+        """Keep the state if its mean loss is the phase's lowest; go back to it if it diverged.
+
+        A loss that merely rises is let rise: the run ends with the best state anyhow.
+        """
+        self._next_snapshot = self.progress + 1 / SNAPSHOTS
+        self._sums, self._count = {}, 0
+        if math.isfinite(total) and total <= DIVERGED * self._lowest:
+            if total < self._lowest:
+                self._lowest = total
+                self._good = deepcopy(self._state())
+            return
+        self.divergences += 1
+        if self.divergences > 1:
+            raise DivergedError("training diverged twice, the second time with a smaller step")
+        self._restore(self._good)
+
+    def _fits(self, seconds: float) -> bool:
+        """Whether a step of this length still ends within the time budget."""
+        return self.time_budget is None or self.seconds + seconds <= self.time_budget
+
+    def _phase(self) -> str:
+        if self.progress < self.preset.warm_up:
+            return "hull"
+        return "subset" if self.progress < self.preset.all_from else "all"
+
+    def _step(self) -> dict[str, float]:
+        """One iteration: its unweighted terms and the weighted total."""
+        points, grid = self._batch()
+        cycle = self.networks(
+            points if self.preset.branches != "2d" else None,
+            grid if self.preset.branches != "3d" else None,
+        )
+        terms = objective_terms(self.preset, cycle, points)
+        total = torch.stack([self.weights[name] * value for name, value in terms.items()]).sum()
+        total.backward()  # type: ignore[no-untyped-call]
+        self.optimizer.step(self._learning_rate())
+        return {name: value.item() for name, value in {**terms, "total": total}.items()}
+
+    def _learning_rate(self) -> float:
+        first, last = self.preset.learning_rate, self.preset.final_learning_rate
+        cosine = (1 + math.cos(math.pi * self.progress)) / 2
+        return (last + (first - last) * cosine) * SMALLER_STEP**self.divergences
+
+    def _batch(self) -> tuple[Tensor, Tensor]:
+        """Perturbed points (n, 3) of the phase and a perturbed lattice (about n, 2)."""
+        cloud = self.hull if self._phase() == "hull" else self.shape
+        if self._phase() != "all" and self.preset.subset < len(cloud):
+            cloud = cloud[
+                torch.randperm(len(cloud), generator=self.generator)[: self.preset.subset]
+            ]
+        noise = self.noise * torch.randn(cloud.shape, generator=self.generator)
+        grid = lattice(round(math.sqrt(len(cloud))), self.generator)
+        return (cloud + noise).to(self.device), grid.to(self.device)
+
+
+def objective_terms(preset: Preset, cycle: Cycle, points: Tensor) -> dict[str, Tensor]:
+    """The unweighted terms of the objective; those of a branch that is left out are missing."""
+    distortion = losses.DISTORTIONS[preset.distortion]
+    eigenvalues = losses.EIGENVALUES[preset.eigenvalues]
+    terms: dict[str, Tensor] = {}
+    cycle_terms, tangents_at = [], []
+    if cycle.point is not None:
+        there = cycle.point
+        terms["unwrap"] = losses.unwrap_loss(
+            there.uv, preset.unwrap_neighbours, preset.unwrap_spacing
+        )
+        cycle_terms += [(there.points, there.points_cycle), (there.cut, there.cut_cycle)]
+        tangents_at.append((there.points_cycle, there.tangents))
+    if cycle.grid is not None:
+        back = cycle.grid
+        terms["wrap"] = losses.wrap_loss(back.points, points)
+        cycle_terms += [(back.uv, back.uv_cycle), (back.cut, back.cut_cycle)]
+        tangents_at.append((back.points, back.tangents))
+    K, T = preset.anti_flip_neighbours, preset.anti_flip_angle
+    return {
+        **terms,
+        "cycle": _sum([losses.cycle_loss(*pair) for pair in cycle_terms]),
+        "distortion": _sum([distortion(*eigenvalues(J)) for _, J in tangents_at]),
+        "anti_flip": _sum([losses.anti_flip_loss(p, J, K, T) for p, J in tangents_at]),
+    }
+
+
+def _sum(terms: list[Tensor]) -> Tensor:
+    return torch.stack(terms).sum()
+
+
+def lattice(side: int, generator: torch.Generator) -> Tensor:
+    """(side², 2) a lattice of cells in [−1, 1]², one point in each, anywhere in it."""
+    cells = torch.cartesian_prod(torch.arange(side), torch.arange(side))
+    return (cells + torch.rand(side * side, 2, generator=generator)) * (2 / side) - 1
+
+
+def mean_spacing(points: FloatArray) -> float:
+    """Mean distance from each of (N, 3) points to its nearest other one."""
+    return float(cKDTree(points).query(points, 2)[0][:, 1].mean())
+
+
+def hull_sample(points: FloatArray, count: int, seed: int) -> FloatArray:
+    """(count, 3) points spread evenly by area over the convex hull of (N, 3) points.
+
+    Points in a plane are their own hull's sample: they come back as they are.
+    """
+    try:
+        hull = ConvexHull(points)
+    except QhullError:
+        return points
+    return surface_sample(points, hull.simplices, count, seed)
+
+
+def surface_sample(vertices: FloatArray, faces: Any, count: int, seed: int) -> FloatArray:
+    """(count, 3) points spread evenly by area over the triangles (F, 3) of vertices (V, 3)."""
+    rng = np.random.default_rng(seed)
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    rows = rng.choice(len(faces), size=count, p=area / area.sum())
+    s, t = np.sqrt(rng.random((count, 1))), rng.random((count, 1))
+    return np.asarray((1 - s) * a[rows] + s * (1 - t) * b[rows] + s * t * c[rows])
