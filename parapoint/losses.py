@@ -16,14 +16,23 @@ EPSILON = 1e-12
 """Added under square roots whose gradient is infinite at 0, where a map is exactly conformal."""
 
 
+class NotFiniteError(ArithmeticError):
+    """The maps have left the finite numbers: the training diverged."""
+
+
 def nearest(queries: Tensor, points: Tensor, count: int) -> Tensor:
     """(N, count) rows of `points` (M, d) nearest to each of `queries` (N, d), nearest first.
 
     No gradient. On a CPU by a k-d tree, 20 times as fast at 2,000 points as all distances; on a
     CUDA device by exact distances (not the matrix trick, which is off by 2e-4 near 0), in slices
     of bounded memory.
+
+    Raises:
+        NotFiniteError: a coordinate is NaN or infinite.
     """
     queries, points = queries.detach(), points.detach()
+    if not bool(queries.isfinite().all() and points.isfinite().all()):
+        raise NotFiniteError
     if queries.device.type == "cpu":
         _, index = cKDTree(points.numpy()).query(queries.numpy(), count)
         return torch.from_numpy(index.reshape(len(queries), count))

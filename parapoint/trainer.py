@@ -55,39 +55,47 @@ class AdamW:
     The same as `torch.optim.AdamW` with its defaults, whose first use takes two seconds of imports.
     """
 
-    BETAS = (0.9, 0.999)
-
     def __init__(self, parameters: list[Tensor], weight_decay: float) -> None:
         self.parameters, self.weight_decay = parameters, weight_decay
-        self.steps = torch.zeros((), dtype=torch.int64)
+        self.steps = [torch.zeros((), device=p.device) for p in parameters]
         self.first = [torch.zeros_like(p) for p in parameters]
         self.second = [torch.zeros_like(p) for p in parameters]
 
     @torch.no_grad()
     def step(self, learning_rate: float) -> None:
-        """Move the parameters along their gradients, and drop these."""
-        active = [i for i, p in enumerate(self.parameters) if p.grad is not None]
-        parameters = [self.parameters[i] for i in active]
-        gradients = [p.grad for p in parameters if p.grad is not None]
-        first, second = [self.first[i] for i in active], [self.second[i] for i in active]
-        self.steps += 1
-        of_first, of_second = (1 - beta ** int(self.steps) for beta in self.BETAS)
-        torch._foreach_lerp_(first, gradients, 1 - self.BETAS[0])
-        torch._foreach_mul_(second, self.BETAS[1])
-        torch._foreach_addcmul_(second, gradients, gradients, 1 - self.BETAS[1])
-        scale = torch._foreach_div(second, of_second)  # noqa: SLF001 (torch.optim uses the same)
-        torch._foreach_sqrt_(scale)
-        torch._foreach_add_(scale, 1e-8)
-        torch._foreach_mul_(parameters, 1 - learning_rate * self.weight_decay)
-        torch._foreach_addcdiv_(parameters, first, scale, -learning_rate / of_first)
+        """Move the parameters that have a gradient, and drop the gradients."""
+        rows = [
+            (parameter, parameter.grad, *moments)
+            for parameter, *moments in zip(
+                self.parameters, self.first, self.second, self.steps, strict=True
+            )
+            if parameter.grad is not None
+        ]
+        parameters, gradients, first, second, steps = (list(of) for of in zip(*rows, strict=True))
+        torch._foreach_add_(steps, 1)
+        # The kernel that torch.optim calls.
+        torch._fused_adamw_(
+            parameters,
+            gradients,
+            first,
+            second,
+            [],
+            steps,
+            lr=learning_rate,
+            beta1=0.9,
+            beta2=0.999,
+            weight_decay=self.weight_decay,
+            eps=1e-8,
+            amsgrad=False,
+            maximize=False,
+        )
         for parameter in parameters:
             parameter.grad = None
 
     def state(self) -> dict[str, Tensor]:
         """The moments by name, not copied."""
-        moments = {"first": self.first, "second": self.second}
-        named = {f"{name}.{i}": t for name, of in moments.items() for i, t in enumerate(of)}
-        return {"steps": self.steps, **named}
+        moments = {"steps": self.steps, "first": self.first, "second": self.second}
+        return {f"{name}.{i}": t for name, of in moments.items() for i, t in enumerate(of)}
 
     def restore(self, state: dict[str, Tensor]) -> None:
         """Copy in what `state` returned."""
@@ -263,7 +271,10 @@ class Trainer:
             points if self.preset.branches != "2d" else None,
             grid if self.preset.branches != "3d" else None,
         )
-        terms = objective_terms(self.preset, cycle, points)
+        try:
+            terms = objective_terms(self.preset, cycle, points)
+        except losses.NotFiniteError:
+            return {"total": math.nan}
         total = torch.stack([self.weights[name] * value for name, value in terms.items()]).sum()
         total.backward()  # type: ignore[no-untyped-call]
         self.optimizer.step(self._learning_rate())
