@@ -127,14 +127,18 @@ def _fitted(
 ) -> estimator.ParaPoint:
     """A model fitted under a progress bar on standard error, none where that is no terminal."""
     from parapoint.estimator import ParaPoint
+    from parapoint.trainer import DivergedError
 
     if isinstance(surface, Mesh) and surface.component_count > 1:
         logging.getLogger("parapoint").warning(
             "%d components: one map is fitted to all of them", surface.component_count
         )
     model = ParaPoint(**settings)
-    with _bar() as advance:
-        return model.fit(surface, checkpoint=checkpoint, callback=advance)
+    try:
+        with _bar() as advance:
+            return model.fit(surface, checkpoint=checkpoint, callback=advance)
+    except DivergedError as error:
+        raise click.ClickException(str(error)) from error
 
 
 @contextmanager

@@ -46,10 +46,11 @@ def opened(mesh: Mesh, uv: FloatArray) -> Parameterization:
     rows = [uv]
     corners: IntArray = mesh.faces.copy()
     count = len(uv)
-    whole = float(
-        np.sqrt(_area(uv[mesh.faces[~spans.any(axis=1)]]) / max(mesh.face_areas.sum(), 1e-300))
-    )
-    mirror = _majority_sign(uv[mesh.faces[~spans.any(axis=1)]])
+    sound = ~spans.any(axis=1)
+    doubled = _doubled_areas(uv[mesh.faces[sound]])
+    mirror = 1.0 if doubled.sum() >= 0 else -1.0
+    real = mesh.face_areas[sound].sum()
+    scale = float(np.sqrt(np.abs(doubled).sum() / 2 / real)) if real > 0 else 1.0
     for face in np.flatnonzero(~sound):
         kept = int(np.argmin(spans[face]))
         at = [kept, (kept + 1) % 3, (kept + 2) % 3]
