@@ -26,6 +26,7 @@ from urllib.parse import unquote
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.transform import Rotation
 
 from parapoint.errors import InputError
 from parapoint.surface import FloatArray, IntArray
@@ -75,6 +76,13 @@ def ranges(starts: IntArray, sizes: IntArray) -> IntArray:
     """The numbers start, start + 1, ... of each run, one run after the other."""
     places = np.arange(int(sizes.sum()), dtype=np.int64)
     return np.asarray(places + np.repeat(starts - (np.cumsum(sizes) - sizes), sizes))
+
+
+def whole(values: FloatArray | IntArray) -> IntArray:
+    """Indices that were read as numbers of any kind."""
+    if not ((np.abs(values) < 2**53) & (np.floor(values) == values)).all():
+        raise InputError("an index is no whole number")
+    return values.astype(np.int64)
 
 
 # OBJ ------------------------------------------------------------------------------------------
@@ -388,6 +396,8 @@ def _ply_table(
     if any(item.count_type is not None for item in properties):
         raise InputError("has lists among its vertex properties, which is not read")
     widths = [body.width(item.type) for item in properties]
+    if not widths:
+        return {}, at
     end = at + count * sum(widths)
     if end > body.size:
         raise InputError(f"ends early: {count} vertices are announced")
@@ -445,7 +455,7 @@ def _ply_lists(
     run = integers(sizes)
     width = body.width(index_type)
     places = np.repeat(integers(starts), run) + width * ranges(np.zeros_like(run), run)
-    return run, body.values(places, index_type).astype(np.int64), at
+    return run, whole(body.values(places, index_type)), at
 
 
 def strip_triangles(sizes: IntArray, corners: IntArray) -> IntArray:
@@ -609,6 +619,8 @@ class _Gltf:
         for primitive, transform in self.placed_primitives():
             attributes = primitive["attributes"]
             local = self.accessor(attributes["POSITION"])
+            if not np.isfinite(local).all():
+                raise InputError("has a position that is not finite")
             place = local @ transform[:3, :3].T + transform[:3, 3]
             mode = primitive.get("mode", 4)
             if mode == 0:
@@ -616,7 +628,7 @@ class _Gltf:
             if mode not in {4, 5, 6}:
                 continue
             run = (
-                np.asarray(self.accessor(primitive["indices"]), dtype=np.int64).reshape(-1)
+                whole(self.accessor(primitive["indices"])).reshape(-1)
                 if "indices" in primitive
                 else np.arange(len(place))
             )
@@ -650,18 +662,18 @@ class _Gltf:
 def _node_transform(node: dict[str, Any]) -> FloatArray:
     """(4, 4) transform of a glTF node: its matrix, or translation, rotation and scale."""
     if "matrix" in node:
-        return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
-    x, y, z, w = node.get("rotation", (0, 0, 0, 1))
-    rotation = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+        matrix = np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
+        if not np.isfinite(matrix).all():
+            raise InputError("has a transform that is not finite")
+        return matrix
+    turn = np.array(node.get("rotation", (0, 0, 0, 1)), dtype=np.float64)
+    stretch = np.array(node.get("scale", (1, 1, 1)), dtype=np.float64)
     transform = np.eye(4)
-    transform[:3, :3] = rotation * np.array(node.get("scale", (1, 1, 1)), dtype=np.float64)
-    transform[:3, 3] = node.get("translation", (0, 0, 0))
+    shift = np.array(node.get("translation", (0, 0, 0)), dtype=np.float64)
+    if not np.isfinite(np.concatenate([turn, stretch, shift])).all():
+        raise InputError("has a transform that is not finite")
+    transform[:3, :3] = Rotation.from_quat(turn).as_matrix() * stretch
+    transform[:3, 3] = shift
     return transform
 
 

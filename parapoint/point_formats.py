@@ -46,7 +46,7 @@ def xyz(data: bytes) -> Content:
     values = table(lines, (0, 1, 2, 3, 4, 5))
     normals = values[:, 3:]
     finite = np.isfinite(values).all(axis=1)
-    length = np.linalg.norm(normals[finite], axis=1)
+    length = np.linalg.norm(np.clip(normals[finite], -2, 2), axis=1)  # clipped: no overflow
     unit = bool(len(length)) and bool((np.abs(length - 1) < 1e-3).all())
     return points_content(values[:, :3], normals if unit else None)
 
@@ -62,6 +62,18 @@ def las(data: bytes) -> Content:
     """LAS, and LAZ where laspy has a decoder: scaled coordinates of all points."""
     import laspy
 
+    if data[:4] != b"LASF":
+        raise InputError("has no LAS header")
+    # laspy makes room for whatever the header announces, be it four thousand million points.
+    start, records, kind, width, points = struct.unpack_from("<IIBHI", data, 96)
+    extended = 0
+    if data[24:26] >= b"\x01\x04":
+        extended, points = struct.unpack_from("<IQ", data, 243)
+    compressed = kind >= 128
+    if not compressed and start + width * points > len(data):
+        raise InputError(f"ends early: {points} points are announced")
+    if 54 * records + 60 * extended > len(data):
+        raise InputError(f"ends early: {records + extended} variable records are announced")
     return points_content(np.asarray(laspy.read(io.BytesIO(data)).xyz, dtype=np.float64))
 
 
