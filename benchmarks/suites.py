@@ -116,8 +116,8 @@ SUITES: dict[str, Suite] = {
             (
                 PAPER_REDUCED,
                 reduced("distortion=isometric"),
-                reduced("branches=2d"),
-                reduced("branches=3d"),
+                reduced("branches='2d'"),
+                reduced("branches='3d'"),
                 reduced("distortion_weight=1e-4"),
             ),
         ),
