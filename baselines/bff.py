@@ -7,12 +7,10 @@ from typing import ClassVar
 
 import igl
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 
-from baselines.flattening import Domain, arc_lengths, check_triangles, domain, finite, scaled
+from baselines.flattening import arc_lengths, check_triangles, closed_holes, domain, finite, scaled
 from parapoint.parameterization import Parameterization
-from parapoint.surface import FloatArray, IntArray, Surface
+from parapoint.surface import FloatArray, Surface
 
 
 @dataclass(frozen=True)
@@ -67,27 +65,10 @@ class BFF:
         return Parameterization(scaled(disk, uv), disk.faces)
 
 
-def closed_holes(disk: Domain) -> tuple[FloatArray, IntArray]:
-    """Vertices and faces of the domain, each loop but the longest closed by a fan around its mean.
-
-    The rows of the domain come first.
-    """
-    halfedges = np.stack([disk.faces, np.roll(disk.faces, -1, axis=1)], axis=2).reshape(-1, 2)
-    size = len(disk.vertices)
-    open_ends = halfedges[~np.isin(halfedges @ [size, 1], halfedges @ [1, size])]
-    inner = open_ends[~np.isin(open_ends[:, 0], disk.loop)]
-    graph = sparse.coo_matrix((np.ones(len(inner), dtype=bool), tuple(inner.T)), (size, size))
-    _, label = csgraph.connected_components(graph, directed=False)
-    _, hole = np.unique(label[inner[:, 0]], return_inverse=True)
-    count = np.bincount(hole)[:, None]
-    centres = np.zeros((len(count), 3))
-    np.add.at(centres, hole, disk.vertices[inner[:, 0]])
-    fans = np.stack([inner[:, 1], inner[:, 0], size + hole], axis=1)
-    return np.concatenate([disk.vertices, centres / count]), np.concatenate([disk.faces, fans])
-
-
 def closed_curve(lengths: FloatArray, turning: FloatArray) -> FloatArray:
     """(B, 2) a closed curve with these exterior angles and nearly these edge lengths.
+
+    Its longest principal axis lies along u, so that the map does not depend on where it begins.
 
     Args:
         lengths: (B,) length of the edge after each vertex.
@@ -99,4 +80,6 @@ def closed_curve(lengths: FloatArray, turning: FloatArray) -> FloatArray:
     weighted = tangents * lengths
     fitted = lengths - weighted.T @ np.linalg.solve(weighted @ tangents.T, tangents @ lengths)
     steps = (tangents * fitted).T
-    return np.cumsum(steps, axis=0) - steps
+    points = np.cumsum(steps, axis=0) - steps
+    a, b = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][0]
+    return np.asarray(points @ [[a, -b], [b, a]], dtype=np.float64)

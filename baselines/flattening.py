@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
 
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError, is_planar_domain
@@ -51,6 +53,25 @@ def domain(surface: Surface) -> Domain:
     )
 
 
+def closed_holes(disk: Domain) -> tuple[FloatArray, IntArray]:
+    """Vertices and faces of the domain, each loop but the longest closed by a fan around its mean.
+
+    The rows of the domain come first.
+    """
+    halfedges = np.stack([disk.faces, np.roll(disk.faces, -1, axis=1)], axis=2).reshape(-1, 2)
+    size = len(disk.vertices)
+    open_ends = halfedges[~np.isin(halfedges @ [size, 1], halfedges @ [1, size])]
+    inner = open_ends[~np.isin(open_ends[:, 0], disk.loop)]
+    graph = sparse.coo_matrix((np.ones(len(inner), dtype=bool), tuple(inner.T)), (size, size))
+    _, label = csgraph.connected_components(graph, directed=False)
+    _, hole = np.unique(label[inner[:, 0]], return_inverse=True)
+    count = np.bincount(hole)[:, None]
+    centres = np.zeros((len(count), 3))
+    np.add.at(centres, hole, disk.vertices[inner[:, 0]])
+    fans = np.stack([inner[:, 1], inner[:, 0], size + hole], axis=1)
+    return np.concatenate([disk.vertices, centres / count]), np.concatenate([disk.faces, fans])
+
+
 def check_triangles(vertices: FloatArray, faces: IntArray) -> None:
     """Raise where a triangle has no area: its cotangents and gradients are undefined.
 
@@ -84,8 +105,8 @@ def circle(points: FloatArray) -> FloatArray:
 
 
 def far_pair(points: FloatArray) -> tuple[int, int]:
-    """Two far points of (B, 3): the farthest from the first, and the farthest from that."""
-    one = int(((points - points[0]) ** 2).sum(axis=1).argmax())
+    """Two far points of (B, 3): the farthest from their mean, and the farthest from that."""
+    one = int(((points - points.mean(axis=0)) ** 2).sum(axis=1).argmax())
     return one, int(((points - points[one]) ** 2).sum(axis=1).argmax())
 
 

@@ -9,18 +9,19 @@ import igl
 import numpy as np
 from scipy import sparse
 
-from baselines.flattening import Domain, circle, domain, scaled, signed_areas
+from baselines.flattening import Domain, circle, closed_holes, domain, scaled, signed_areas
 from parapoint.parameterization import Parameterization
-from parapoint.surface import FloatArray, Surface
+from parapoint.surface import FloatArray, IntArray, Surface
 
 
 @dataclass(frozen=True)
 class Tutte:
     """Tutte's embedding with uniform weights; the longest boundary loop on a circle.
 
-    W. T. Tutte 1963, "How to draw a graph". The loop is spaced by arc length; vertices of other
-    loops are free like inner ones. The disk is embedded without flips if its graph is 3-connected
-    (an edge across the disk between two boundary vertices breaks that); the report counts them.
+    W. T. Tutte 1963, "How to draw a graph". The loop is spaced by arc length; other loops are free.
+    A vertex of another loop with two neighbours only then lands between them and its triangle has
+    no area: where that happens, the loops are closed by fans for the solve. The report counts what
+    flipped none the less, which takes triangles below the precision of a number.
     """
 
     requires: ClassVar[frozenset[str]] = frozenset({"faces", "disk_after_cut"})
@@ -42,12 +43,25 @@ class Tutte:
 
 def tutte(disk: Domain) -> FloatArray:
     """(V, 2) Tutte's embedding of a domain, scaled to its 3D area."""
-    adjacency = igl.adjacency_matrix(disk.faces).astype(np.float64)
+    uv = scaled(disk, _embedded(disk, disk.vertices, disk.faces))
+    if (signed_areas(uv, disk.faces) > 0).all():
+        return uv
+    vertices, faces = closed_holes(disk)
+    if len(vertices) == len(disk.vertices):
+        return uv
+    return scaled(disk, _embedded(disk, vertices, faces)[: len(disk.vertices)])
+
+
+def _embedded(disk: Domain, vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """(V, 2) each vertex at the mean of its neighbours, the domain's loop on the unit circle."""
+    adjacency = igl.adjacency_matrix(faces).astype(np.float64)
     laplacian = sparse.diags(adjacency.sum(axis=1).A1) - adjacency
-    uv = igl.min_quad_with_fixed(
-        laplacian.tocsc(),
-        np.zeros((len(disk.vertices), 2)),
-        disk.loop,
-        circle(disk.vertices[disk.loop]),
+    return np.asarray(
+        igl.min_quad_with_fixed(
+            laplacian.tocsc(),
+            np.zeros((len(vertices), 2)),
+            disk.loop,
+            circle(disk.vertices[disk.loop]),
+        ),
+        dtype=np.float64,
     )
-    return scaled(disk, uv)

@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from baselines.atlas import atlas
+from baselines.flattening import FlatteningError
 from baselines.optional import optional
 from parapoint.method import UnsupportedError
 from parapoint.parameterization import Parameterization
@@ -49,12 +50,17 @@ class UVUnwrap:
 
         Raises:
             UnsupportedError: the surface is a point cloud, or uvunwrap is not installed.
-            FlatteningError: uvunwrap returned other faces, or NaN.
+            FlatteningError: uvunwrap panicked, or returned other faces or NaN.
         """
         if not isinstance(surface, Mesh):
             raise UnsupportedError("needs faces; the surface is a point cloud")
         given = uvunwrap.Mesh(surface.vertices, surface.faces.astype(np.uint32))
-        made = uvunwrap.generate([given], **asdict(self))
+        try:
+            made = uvunwrap.generate([given], **asdict(self))
+        except BaseException as error:
+            if type(error).__name__ == "PanicException":  # Rust's; no subclass of Exception
+                raise FlatteningError(f"uvunwrap panicked: {error}") from None
+            raise
         mesh = made.meshes[0]
         return atlas(
             surface,

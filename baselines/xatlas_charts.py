@@ -34,8 +34,9 @@ class Xatlas:
     """Atlas of charts grown by cost, flattened by LSCM or projection, and packed.
 
     J. Young, https://github.com/jpcy/xatlas; chart growing after Sander et al. 2003, "Multi-chart
-    geometry images". Works in float32. Takes any mesh. Without `fix_winding` about half of its
-    charts come back mirrored, which is no flip. Several pages are laid side by side.
+    geometry images". Works in float32. Takes any mesh. About half of its charts come back mirrored,
+    which is no flip: it turns charts by a quarter by swapping u and v. Several pages are laid side
+    by side.
 
     Attributes:
         max_chart_area: largest 3D area of a chart; 0 for no limit.
@@ -46,7 +47,7 @@ class Xatlas:
         normal_seam_weight: cost of charts across creases; over 1000 none crosses.
         max_cost: a chart grows until its cost is above this; lower means more charts.
         max_iterations: rounds of growing and seeding anew.
-        fix_winding: turn mirrored charts over.
+        fix_winding: turn mirrored charts over before packing.
         max_chart_size: larger charts are scaled down to this many texels; 0 for no limit.
         padding: texels between charts.
         texels_per_unit: texels in a unit of length; 0 for about a 1024 x 1024 page.

@@ -130,7 +130,7 @@ def _disk_cut(mesh: Mesh) -> BoolArray:
         count = (missing + 1) // 2
         cut = _arcs(mesh, lengths, cut, np.unique(mesh.edges[cut]), count)
         missing -= count
-    return cut & (mesh.edge_face_count == 2)
+    return np.asarray(cut & (mesh.edge_face_count == 2), dtype=bool)
 
 
 def _graph(mesh: Mesh, lengths: FloatArray) -> sparse.csr_matrix:

@@ -1,0 +1,221 @@
+import subprocess
+import sys
+import textwrap
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import pytest
+
+import baselines
+from baselines import registry
+from baselines.slim import SLIM
+from parapoint.errors import InputError
+from parapoint.testing import check_method, irregular_disk
+
+EXAMPLE = textwrap.dedent(
+    baselines.__doc__.split("the file `planar.py`:\n\n")[1].split("\n\nRun it")[0]
+)
+
+
+@pytest.fixture
+def _no_plugins(monkeypatch):
+    """An empty table of plugins for one test."""
+    monkeypatch.setattr(registry, "_plugins", {})
+
+
+def test_specs():
+    assert registry.method("slim") == ("slim", SLIM())
+    spec = " slim ( energy = conformal , iterations = 5 ) "
+    assert registry.method(spec) == ("slim", SLIM("conformal", 5))
+    assert registry.method("slim(energy='conformal')")[1] == SLIM("conformal")
+    assert registry.method("xatlas(max_cost=3)")[1].max_cost == 3.0
+    assert isinstance(registry.method("xatlas(max_cost=3)")[1].max_cost, float)
+
+
+@pytest.mark.parametrize(
+    ("spec", "fault"),
+    [
+        ("slin", "no method 'slin'; did you mean slim"),
+        ("quux", "no method 'quux'; there are: tutte, "),
+        ("slim(iteration=3)", "slim has no parameter 'iteration'; did you mean iterations"),
+        ("lscm(x=3)", "lscm has no parameter 'x'; it has none"),
+        ("slim(iterations=many)", "slim: iterations must be int, not 'many'"),
+        ("slim(iterations=2.5)", "slim: iterations must be int, not 2.5"),
+        ("slim(iterations=True)", "slim: iterations must be int, not True"),
+        ("slim(energy=arap)", "energy must be one of symmetric_dirichlet, conformal"),
+        ("slim(iterations=1, iterations=2)", "slim: parameter 'iterations' is given twice"),
+        ("slim(iterations=f())", "iterations=f\\(\\) is no plain value"),
+        ("slim(3)", "name or name\\(key=value"),
+        ("slim(**{})", "name or name\\(key=value"),
+        ("slim(iterations=3", "name or name\\(key=value"),
+        ("slim(iterations=3))(", "name or name\\(key=value"),
+        ("", "name or name\\(key=value"),
+        ("xatlas(fix_winding=1)", "fix_winding must be bool, not 1"),
+    ],
+)
+def test_bad_specs_say_what_would_do(spec, fault):
+    with pytest.raises(InputError, match=fault):
+        registry.method(spec)
+
+
+@pytest.mark.parametrize(
+    ("value", "hint", "checked"),
+    [
+        (3, float, 3.0),
+        (None, int | None, None),
+        (3, int | None, 3),
+        ([1, 2], tuple[int, ...], (1, 2)),
+        ([1, 2], tuple[float, float], (1.0, 2.0)),
+        ("a", Literal["a", "b"], "a"),
+        ({"any": 1}, dict, {"any": 1}),
+    ],
+)
+def test_values_become_the_type_of_their_field(value, hint, checked):
+    assert registry._checked(value, hint, "x") == checked
+
+
+@pytest.mark.parametrize(
+    ("value", "hint"),
+    [
+        ("3", int),
+        (True, float),
+        ([1, 2, 3], tuple[int, int]),
+        ("x", int | None),
+        (["a"], tuple[int, ...]),
+    ],
+)
+def test_values_of_another_type_are_refused(value, hint):
+    with pytest.raises(InputError, match="x must be"):
+        registry._checked(value, hint, "x")
+
+
+def test_importing_the_registry_imports_no_method():
+    code = """
+import sys
+from baselines import registry
+assert "torch" not in sys.modules
+others = [m for m in sys.modules if m.startswith("baselines.") and m != "baselines.registry"]
+assert not others, others
+registry.names()
+registry.method("tutte")
+for name in ("torch", "xatlas", "pymeshlab", "uvunwrap", "baselines.slim"):
+    assert name not in sys.modules, name
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_every_built_in_method_is_described():
+    for name in registry.METHODS:
+        about = registry.describe(name)
+        assert about.name == name
+        assert about.summary.endswith((".", ")", "."))
+    about = registry.describe("slim")
+    assert about.requires == ("disk_after_cut", "faces")
+    assert about.parameters == {"energy": "'symmetric_dirichlet'", "iterations": "20"}
+
+
+def test_source_hash_follows_the_method_s_own_modules_and_its_libraries(monkeypatch):
+    hashes = {
+        name: registry.source_hash(registry.method(name)[1]) for name in ("lscm", "slim", "tutte")
+    }
+    assert len(set(hashes.values())) == 3
+    assert registry.source_hash(SLIM(iterations=5)) == hashes["slim"]  # parameters stand elsewhere
+    sources = registry._sources(sys.modules["baselines.slim"])
+    assert set(sources) == {"baselines.slim", "baselines.tutte", "baselines.flattening"}
+    monkeypatch.setattr(registry, "_version", lambda package: f"{package} of tomorrow")
+    assert registry.source_hash(SLIM()) != hashes["slim"]
+
+
+@pytest.mark.usefixtures("_no_plugins")
+def test_source_hash_of_a_plugin_does_not_depend_on_its_folder(tmp_path):
+    made = []
+    for folder in ("a", "b", "c"):
+        (tmp_path / folder).mkdir()
+        file = tmp_path / folder / "planar.py"
+        file.write_text(EXAMPLE + "# changed" * (folder == "c"))
+        registry._plugins.clear()
+        registry.register_plugin(f"{file}:Planar")
+        made.append(registry.source_hash(registry.method("planar")[1]))
+    assert made[0] == made[1] != made[2]
+
+
+@pytest.mark.usefixtures("_no_plugins")
+def test_example_of_the_documentation_is_short_and_runs_as_it_stands(tmp_path):
+    assert len(EXAMPLE.strip().splitlines()) <= 20
+    file = tmp_path / "planar.py"
+    file.write_text(EXAMPLE)
+    assert registry.register_plugin(f"{file}:Planar") == "planar"
+    assert registry.register_plugin(f"{file}:Planar") == "planar"  # again: the same one
+    assert "planar" in registry.names()
+    name, method = registry.method("planar(scale=2)")
+    assert (name, method.scale) == ("planar", 2.0)
+    check_method(method)
+    assert registry.describe("planar").parameters == {"scale": "1.0"}
+
+
+def test_installed_package_is_a_method(tmp_path, monkeypatch):
+    (tmp_path / "planar.py").write_text(EXAMPLE)
+    info = tmp_path / "planar-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: planar\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(
+        "[parapoint.methods]\nplanar = planar:Planar\nbroken = no_such_module:Thing\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    assert {"planar", "broken"} <= set(registry.names())
+    check_method(registry.method("planar")[1], irregular_disk())
+    with pytest.raises(InputError, match=r"broken .* cannot be imported"):
+        registry.method("broken")
+    monkeypatch.delitem(sys.modules, "planar")
+
+
+@pytest.mark.usefixtures("_no_plugins")
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("1 / 0", "does not run: ZeroDivisionError"),
+        ("class Thing: pass", "no dataclass with a method parameterize"),
+        (
+            (
+                "from dataclasses import dataclass\n@dataclass\nclass Thing:\n"
+                "    requires = frozenset({'wings'})\n    def parameterize(self, surface): ..."
+            ),
+            "requires in .* must be a frozenset of",
+        ),
+        ("other = 1", "there is no class Thing"),
+    ],
+)
+def test_bad_plugins_are_refused(tmp_path, text, fault):
+    file = tmp_path / "thing.py"
+    file.write_text(text)
+    with pytest.raises(InputError, match=fault):
+        registry.register_plugin(f"{file}:Thing")
+
+
+@pytest.mark.usefixtures("_no_plugins")
+def test_plugin_locations_and_names_that_do_not_do(tmp_path):
+    for location in ("thing.py", "thing.py:", ":Thing", "thing.py:not a name"):
+        with pytest.raises(InputError, match=r"path/to/file\.py:Class"):
+            registry.register_plugin(location)
+    with pytest.raises(InputError, match=r"no plugin file nowhere\.py"):
+        registry.register_plugin("nowhere.py:Thing")
+    file = tmp_path / "mine.py"
+    file.write_text(EXAMPLE.replace("Planar", "Slim"))
+    with pytest.raises(InputError, match="a method 'slim' already; rename"):
+        registry.register_plugin(f"{file}:Slim")
+
+
+def test_fields_that_are_no_arguments_are_left_out(monkeypatch):
+    @dataclass(frozen=True)
+    class Sized:
+        """A method."""
+
+        sizes: tuple[int, ...] = (1, 2)
+        requires: ClassVar[frozenset[str]] = frozenset()
+
+        def parameterize(self, surface, *, seed):
+            raise NotImplementedError
+
+    monkeypatch.setattr(registry, "_plugins", {"sized": Sized})
+    assert registry.describe("sized").parameters == {"sizes": "(1, 2)"}
+    assert registry.method("sized(sizes=[3])")[1].sizes == (3,)

@@ -1,0 +1,198 @@
+"""check_method finds each broken promise."""
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from parapoint.method import REQUIREMENTS, UnsupportedError, prepared
+from parapoint.parameterization import Parameterization, PointParameterization, TracePoint
+from parapoint.surface import Mesh, PointCloud
+from parapoint.testing import check_method, irregular_disk, sample_surfaces
+
+
+@dataclass(frozen=True)
+class Good:
+    """Drops the third coordinate."""
+
+    requires: ClassVar[frozenset[str]] = frozenset()
+
+    def parameterize(self, surface, *, seed):  # noqa: ARG002 (the protocol's signature)
+        if isinstance(surface, PointCloud):
+            return PointParameterization(surface.points[:, :2])
+        return self.of_mesh(surface)
+
+    def of_mesh(self, mesh):
+        return Parameterization(mesh.vertices[:, :2], mesh.faces)
+
+
+@dataclass(frozen=True)
+class MeshOnly(Good):
+    requires: ClassVar[frozenset[str]] = frozenset({"faces"})
+
+    def parameterize(self, surface, *, seed):  # noqa: ARG002 (the protocol's signature)
+        if not isinstance(surface, Mesh):
+            raise UnsupportedError("needs faces")
+        return self.of_mesh(surface)
+
+
+@dataclass(frozen=True)
+class Silent(Good):
+    requires: ClassVar[frozenset[str]] = frozenset({"faces"})
+
+
+@dataclass(frozen=True)
+class UnknownWord(Good):
+    requires: ClassVar[frozenset[str]] = frozenset({"wings"})
+
+
+@dataclass(frozen=True)
+class FewFaces(Good):
+    def of_mesh(self, mesh):
+        return Parameterization(mesh.vertices[:, :2], mesh.faces[1:])
+
+
+@dataclass(frozen=True)
+class Shuffled(Good):
+    def of_mesh(self, mesh):
+        moved = np.roll(mesh.faces, 1, axis=0)
+        return Parameterization(
+            mesh.vertices[mesh.faces].mean(axis=1)[:, :2],
+            np.tile(np.arange(len(moved))[:, None], 3),
+        )
+
+
+@dataclass(frozen=True)
+class Collapsed(Good):
+    def of_mesh(self, mesh):
+        return Parameterization(mesh.vertices[:, [0, 0]], mesh.faces)
+
+
+@dataclass(frozen=True)
+class Unseeded(Good):
+    def of_mesh(self, mesh):
+        uv = mesh.vertices[:, :2] * np.random.default_rng().uniform(1, 2)
+        return Parameterization(uv, mesh.faces)
+
+
+@dataclass(frozen=True)
+class Meddling(Good):
+    def of_mesh(self, mesh):
+        result = super().of_mesh(mesh)
+        mesh.vertices.setflags(write=True)
+        mesh.vertices[0] += 1
+        return result
+
+
+@dataclass(frozen=True)
+class Picky(Good):
+    def of_mesh(self, mesh):
+        if mesh.component_count > 1:
+            raise UnsupportedError("one component at a time")
+        return super().of_mesh(mesh)
+
+
+@dataclass(frozen=True)
+class WrongType(Good):
+    def of_mesh(self, mesh):
+        return PointParameterization(mesh.vertices[:, :2])
+
+
+@dataclass(frozen=True)
+class BackwardTrace(Good):
+    def of_mesh(self, mesh):
+        trace = tuple(TracePoint(n, 0.0, {}) for n in (2, 1))
+        return Parameterization(mesh.vertices[:, :2], mesh.faces, trace)
+
+
+@dataclass(frozen=True)
+class TraceOfOtherShape(Good):
+    def of_mesh(self, mesh):
+        trace = (TracePoint(1, 0.0, {}, np.zeros((3, 2))),)
+        return Parameterization(mesh.vertices[:, :2], mesh.faces, trace)
+
+
+@dataclass(frozen=True)
+class ArrayReport(Good):
+    def of_mesh(self, mesh):
+        return Parameterization(mesh.vertices[:, :2], mesh.faces, report={"a": np.ones(2)})
+
+
+@dataclass(frozen=True)
+class ArrayParameter(Good):
+    weights: object = field(default_factory=lambda: np.ones(2))
+
+
+@dataclass(frozen=True)
+class Unpicklable(Good):
+    def __reduce__(self):
+        raise TypeError("no")
+
+
+class NoDataclass(Good):
+    def __new__(cls):
+        return object.__new__(type("Plain", (), {"requires": frozenset()}))
+
+
+def test_honest_methods_pass():
+    check_method(Good())
+    check_method(MeshOnly())
+    check_method(Picky(), irregular_disk())
+
+
+@pytest.mark.parametrize(
+    ("method", "promise"),
+    [
+        (Silent(), "on a point cloud: returned a map, though"),
+        (UnknownWord(), r"requires unknown words \['wings'\]"),
+        (FewFaces(), r"corners have shape \(127, 3\), the faces \(128, 3\)"),
+        (Shuffled(), "not in the order of the mesh"),
+        (Collapsed(), "collapsed to a line"),
+        (Unseeded(), "another map under the same seed"),
+        (Meddling(), "changed the surface's vertices"),
+        (Picky(), "on two components: refused, though it meets `requires`"),
+        (WrongType(), "returned PointParameterization; a mesh needs a Parameterization"),
+        (BackwardTrace(), "the iterations of the trace go back"),
+        (TraceOfOtherShape(), "the map at iteration 1 of the trace is not one"),
+        (ArrayReport(), "the report cannot be written as JSON"),
+        (ArrayParameter(), "its parameters cannot be written as JSON"),
+        (Unpicklable(), "cannot be pickled: no"),
+        (NoDataclass(), "is no dataclass"),
+        (Good, "give a method, not its class"),
+    ],
+    ids=lambda value: getattr(value, "__name__", type(value).__name__),
+)
+def test_broken_promise_is_named(method, promise):
+    with pytest.raises(AssertionError, match=promise):
+        check_method(method)
+
+
+def test_method_that_can_do_nothing_here_is_unsupported():
+    class Absent(MeshOnly):
+        def of_mesh(self, mesh):  # noqa: ARG002 (as its base)
+            raise UnsupportedError("needs a package that is not installed")
+
+    Absent.__qualname__ = "Absent"
+    globals()["Absent"] = Absent  # pickle looks it up
+    with pytest.raises(UnsupportedError):
+        check_method(Absent())
+    with pytest.raises(UnsupportedError):
+        check_method(MeshOnly(), PointCloud(np.ones((3, 3))))
+
+
+def test_samples_cover_what_methods_may_require():
+    surfaces = sample_surfaces()
+    topologies = {s.topology for s in surfaces.values() if isinstance(s, Mesh)}
+    assert {"disk", "sphere", "2 components", "genus 0 with 2 boundary loops"} <= topologies
+    littered = surfaces["a disk with unreferenced and duplicate vertices"]
+    assert not littered.referenced.all()
+    assert len(np.unique(littered.vertices, axis=0)) < len(littered.vertices) - 1
+    for word in REQUIREMENTS.keys() - {"cuda"}:
+        refused = 0
+        for surface in surfaces.values():
+            try:
+                prepared(surface, frozenset({word}))
+            except UnsupportedError:
+                refused += 1
+        assert 1 <= refused < len(surfaces), word
