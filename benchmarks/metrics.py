@@ -104,7 +104,8 @@ class MapState:
     @cached_property
     def spanning(self) -> BoolArray:
         """(F,) whether a face spans a seam."""
-        return seams.spanning_faces(self.mesh, self.parameterization)
+        overlapped = self.validity.overlaps.overlapped
+        return seams.spanning_faces(self.mesh, self.parameterization, overlapped)
 
     @cached_property
     def distortion(self) -> FaceDistortion:

@@ -185,8 +185,8 @@ def _rank_agreement(found: IntArray, expected: IntArray, tree: cKDTree) -> float
     centre = tree.data[asked[row]]
     distance = np.linalg.norm(tree.data[found[asked[row], column]] - centre, axis=1)
     # As many points as lie within the distance, the point itself among them, give the rank + 1.
-    within = tree.query_ball_point(centre, distance, return_length=True)
-    # An equal distance may count fewer by rounding, but a stranger's rank is more than k.
+    # A little more distance keeps the stranger in, whose own distance is rounded.
+    within = tree.query_ball_point(centre, distance * (1 + 1e-12), return_length=True)
     excess = np.maximum(np.asarray(within, dtype=np.float64) - 1 - k, 1).sum()
     return float(1 - 2 * excess / (len(asked) * k * (2 * count - 3 * k - 1)))
 

@@ -1,19 +1,21 @@
 """Seams, charts and packing of a map, and the faces that span a seam which the map does not have.
 
 A neural map gives one uv to each vertex, so on a closed surface some faces bridge its learned cut:
-their corners lie on both banks, and drawn in the plane they cross it. The rule that finds them,
-the same for every map: a UV edge between rows i and j is **spanning** if
+their corners lie on both banks, and drawn in the plane they cross over others. The rule that finds
+them, the same for every map: a UV edge between rows i and j is **spanning** if
 
 1. it is longer than 1 % of L, the side of the square bounding box of the map (ParaPoint's T_cut),
 2. its stretch, UV length over 3D length, exceeds 5 times that of its surroundings, and
 3. its UV length exceeds 5 times what its surroundings would make of its 3D vector,
 
-and a face is spanning if one of its edges is. The surroundings at an end are the edges (2) or the
-Jacobians of the faces (3) there, by their lower quartile, of the two ends the calmer one: so one
-sound bank suffices, and half of all edges at an end may cross the cut. Condition 2 alone takes
-anisotropic faces (a pole, a Tutte map) for spanning, 3 alone thin faces whose Jacobians are wild.
-On LSCM and SLIM maps of disks no face meets both; on a sphere in longitude and latitude those
-that bridge the date line do, and no other away from the poles.
+and a face is spanning if one of its edges is and it overlaps another face. The surroundings at an
+end are the edges (2) or the Jacobians of the faces (3) there, by their lower quartile, of the two
+ends the calmer one: so one sound bank suffices, and half of all edges at an end may cross the cut.
+Condition 2 alone takes anisotropic faces (a pole, a Tutte map) for spanning, 3 alone thin faces
+whose Jacobians are wild, both together a few of SLIM's where it squeezes a finger flat. With the
+overlap no face of an injective map spans, however distorted: a face that bridges the gap of a cut
+without crossing anything is part of such a map, and its distortion counts. On a sphere in
+longitude and latitude the faces that bridge the date line span, and no others away from the poles.
 """
 
 from __future__ import annotations
@@ -113,14 +115,24 @@ def _lengths(vectors: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(np.einsum("ij,ij->i", vectors, vectors)), dtype=np.float64)
 
 
-def spanning_faces(mesh: Mesh, parameterization: Parameterization) -> BoolArray:
-    """(F,) whether a face spans a seam, by the rule of this module."""
-    spanning = spanning_edges(mesh, parameterization)
-    return np.asarray(spanning[parameterization.edge_of_halfedge].reshape(-1, 3).any(axis=1))
+def spanning_faces(
+    mesh: Mesh, parameterization: Parameterization, overlapped: BoolArray
+) -> BoolArray:
+    """(F,) whether a face spans a seam, by the rule of this module.
+
+    Args:
+        mesh: the surface.
+        parameterization: the map.
+        overlapped: (F,) which faces overlap another.
+    """
+    if not overlapped.any():
+        return overlapped
+    spanning = spanning_edges(mesh, parameterization)[parameterization.edge_of_halfedge]
+    return np.asarray(spanning.reshape(-1, 3).any(axis=1) & overlapped)
 
 
 def spanning_edges(mesh: Mesh, parameterization: Parameterization) -> BoolArray:
-    """(E,) whether an edge of `parameterization.edges` spans a seam, by the rule of this module."""
+    """(E,) whether an edge of `parameterization.edges` spans, by the rule of this module."""
     uv = parameterization.uv / power_of_two(parameterization.uv)
     edges, corners = parameterization.edges, parameterization.corners
     uv_length = _lengths(uv[edges[:, 1]] - uv[edges[:, 0]])

@@ -3,10 +3,11 @@
 import igl
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
+
 from benchmarks import builtin, distortion, models
 from benchmarks.distortion import face_distortion, triangles
 from benchmarks.metrics import METRICS, MapState, evaluate
-from numpy.testing import assert_allclose
 from parapoint import Mesh, Parameterization
 
 DISTORTIONS = [m for m in METRICS.values() if m.group in ("conformal", "authalic", "isometric")]
@@ -146,9 +147,7 @@ def test_singular_values_agree_with_a_decomposition():
         expected = np.linalg.svd(jacobian, compute_uv=False)
         assert_allclose(found.sigma1[face], expected[0], rtol=1e-11)
         assert_allclose(found.sigma2[face], expected[1], rtol=1e-8)  # the decomposition's own error
-    assert_allclose(
-        found.sigma1 * found.sigma2, np.abs(found.uv_area) / found.area, rtol=1e-11
-    )
+    assert_allclose(found.sigma1 * found.sigma2, np.abs(found.uv_area) / found.area, rtol=1e-11)
     assert_allclose(found.area, igl.doublearea(vertices, faces) / 2, rtol=1e-9)
 
 
@@ -257,9 +256,7 @@ def test_the_stereographic_cap_face_by_face():
     roots = np.stack([root[mesh.faces[:, i]] * root[mesh.faces[:, j]] for i, j in ends], 1)
     expected = np.abs(angles(chords) - angles(chords * roots))
     assert_allclose(state.distortion.angle_difference, expected, atol=1e-9)
-    assert_allclose(
-        distortion.angle_difference_mean(state.distortion), expected.mean(), rtol=1e-9
-    )
+    assert_allclose(distortion.angle_difference_mean(state.distortion), expected.mean(), rtol=1e-9)
 
 
 def test_the_stereographic_cap_is_conformal_in_the_limit():

@@ -4,12 +4,13 @@ import igl
 import numpy as np
 import pytest
 import shapely
-from benchmarks import builtin, overlap
-from benchmarks.distortion import triangles
-from benchmarks.metrics import MapState, evaluate
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+
+from benchmarks import builtin, overlap
+from benchmarks.distortion import triangles
+from benchmarks.metrics import MapState, evaluate
 from parapoint import Mesh, Parameterization
 
 EXACT = 1e-12
@@ -44,7 +45,9 @@ def test_one_mirrored_chart_of_two_is_no_flip():
     points, faces = strip(3)
     two = np.concatenate([faces, faces + len(points)])
     uv = np.concatenate([points, points * [-1, 1] + [-5, 0]])
-    values = evaluate(Mesh(lifted(np.concatenate([points, points + 9])), two), Parameterization(uv, two))
+    values = evaluate(
+        Mesh(lifted(np.concatenate([points, points + 9])), two), Parameterization(uv, two)
+    )
     assert values["flipped_fraction"] == 0
     assert values["flipped_fraction_global"] == 0.5
     assert values["flipped_uv_area_fraction"] == 0
@@ -251,9 +254,12 @@ def test_neighbours_in_a_sound_fan_are_never_compared(monkeypatch):
     mesh = builtin.sphere_cap(60, 10)
     parameterization = Parameterization(mesh.vertices[:, :2], mesh.faces)
     compared = []
-    monkeypatch.setattr(
-        overlap, "separated", lambda a, b, t: compared.append(len(a)) or np.ones(len(a), dtype=bool)
-    )
+
+    def separated(a, _, __):
+        compared.append(len(a))
+        return np.ones(len(a), dtype=bool)
+
+    monkeypatch.setattr(overlap, "separated", separated)
     found = state(mesh, parameterization).validity.overlaps
     assert found.pair_count == 0
     assert sum(compared) < 2 * len(mesh.faces)  # each face has some 12 neighbours
