@@ -179,5 +179,14 @@ def score(ctx: click.Context, arguments: tuple[str, ...]) -> None:
         command.invoke(inner)
 
 
+@main.command()
+def speed() -> None:
+    """How much of the machine's rate the heavy parts reach, measured in this run."""
+    from benchmarks.display import print_table
+    from benchmarks.speed import training_table
+
+    print_table(training_table())
+
+
 if __name__ == "__main__":
     console.run(main)

@@ -28,6 +28,7 @@ ENDINGS = (".obj", ".ply", ".npz")
 OPTIONS = (
     click.option("--preset", default="fast", show_default=True, help="fast or paper."),
     click.option("--points", type=int, help="Training points."),
+    click.option("--subset", type=int, help="Points of a step, before the last ones take all."),
     click.option("--iterations", type=int, help="Steps."),
     click.option("--time-budget", type=float, metavar="S", help="Seconds of fitting at most."),
     click.option("--distortion", help="conformal, or isometric in its place."),
@@ -82,7 +83,7 @@ def map_(model: str, surface: str, out: str, device: str, as_json: bool) -> None
 
     The training points fill the unit square. A mesh written as OBJ is cut as `unwrap` says.
     """
-    _check_ending(out)
+    _check_target(out)
     from parapoint.estimator import ParaPoint
 
     fitted = ParaPoint.load(model, device=device)
@@ -103,7 +104,7 @@ def unwrap(surface: str, out: str, as_json: bool, **settings: Any) -> None:
     lie on both banks stays at the bank of its one short edge, in its true shape, and is not drawn
     across the plane.
     """
-    _check_ending(out)
+    _check_target(out)
     given = read_surface(surface)
     model = _fitted(given, settings, checkpoint=None)
     facts = _write(model, given, out, checkerboard())
@@ -117,9 +118,11 @@ def checkerboard(squares: int = 32, pixels: int = 32) -> npt.NDArray[np.uint8]:
     return np.where(dark[:, :, None], np.uint8(70), np.uint8(235)).repeat(3, axis=2)
 
 
-def _check_ending(path: str) -> None:
+def _check_target(path: str) -> None:
     if Path(path).suffix.lower() not in ENDINGS:
         raise InputError(f"{path}: cannot write this ending; take {', '.join(ENDINGS)}")
+    if not Path(path).absolute().parent.is_dir():
+        raise InputError(f"{path}: there is no such folder; make it first")
 
 
 def _fitted(

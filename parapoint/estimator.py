@@ -80,6 +80,7 @@ class ParaPoint:
         iterations: steps, the warm-up included.
         time_budget: seconds of fitting; the schedule follows the time where that ends sooner.
         subset: points of a step before the last phase, which takes all.
+        all_from: share of the run after which steps take all points.
         distortion: "conformal" or "isometric".
         distortion_weight: its weight; the paper's text has 1e-4 for complex shapes.
         eigenvalues: "singular" or "gram", the readings of "the eigenvalues of the Jacobian".
@@ -102,6 +103,7 @@ class ParaPoint:
     iterations: int | None = None
     time_budget: float | None = None
     subset: int | None = None
+    all_from: float | None = None
     distortion: str | None = None
     distortion_weight: float | None = None
     eigenvalues: str | None = None
@@ -365,6 +367,8 @@ class ParaPoint:
                 raise InputError(f"{name} must be one of {', '.join(choices)}, not {value!r}")
         if self.time_budget is not None and not 0 < self.time_budget < math.inf:
             raise InputError(f"time_budget must be a number of seconds, not {self.time_budget}")
+        if self.all_from is not None and not 0 <= self.all_from <= 1:
+            raise InputError(f"all_from must lie between 0 and 1, not {self.all_from}")
         weight = self.distortion_weight
         if weight is not None and not 0 <= weight < math.inf:
             raise InputError(f"distortion_weight must be a number of at least 0, not {weight}")

@@ -1,0 +1,178 @@
+import json
+
+import numpy as np
+import pytest
+
+from parapoint import InputError, Mesh, ParaPoint, cli, files
+from parapoint.spanning import opened, spanning_edges
+from parapoint.testing import irregular_disk
+
+TINY = ["--preset", "paper", "--points", "150", "--subset", "100", "--iterations", "4"]
+
+
+def run(arguments: list[str], capsys) -> tuple[int, str, str]:
+    """Exit status, standard output and standard error of a command."""
+    with pytest.raises(SystemExit) as end:
+        cli.console.run(cli.parapoint, arguments)
+    shown = capsys.readouterr()
+    return int(end.value.code or 0), shown.out, shown.err
+
+
+@pytest.fixture
+def cloud(tmp_path):
+    points = np.random.default_rng(0).normal(size=(300, 3))
+    path = tmp_path / "cloud.xyz"
+    np.savetxt(path, points / np.linalg.norm(points, axis=1, keepdims=True))
+    return path
+
+
+@pytest.fixture
+def disk(tmp_path):
+    mesh = irregular_disk()
+    lines = [f"v {x} {y} {z}" for x, y, z in mesh.vertices]
+    lines += [f"f {a} {b} {c}" for a, b, c in mesh.faces + 1]
+    path = tmp_path / "disk.obj"
+    path.write_text("\n".join(lines))
+    return path
+
+
+def test_fit_then_map_a_cloud(cloud, tmp_path, capsys) -> None:
+    model = tmp_path / "model"
+    status, out, err = run(["fit", str(cloud), "--out", str(model), *TINY, "--json"], capsys)
+    assert (status, err) == (0, "")
+    assert json.loads(out)["iterations"] == 4
+    target = tmp_path / "map.npz"
+    status, out, err = run(["map", str(model), str(cloud), "--out", str(target)], capsys)
+    assert (status, err) == (0, "")
+    with np.load(target) as written:
+        uv = written["uv"]
+    fitted = ParaPoint.load(model)
+    raw = fitted.transform(files.read_surface(cloud))
+    assert np.corrcoef(uv[:, 0], raw[:, 0])[0, 1] == pytest.approx(1)
+    known = fitted.transform(fitted.points_)
+    assert (
+        np.ptp(uv, axis=0).max() >= np.ptp(known, axis=0).max() / np.ptp(known, axis=0).max() - 1e-6
+    )
+    assert -0.5 < uv.min() <= uv.max() < 1.5
+
+
+def test_unwrap_a_mesh_with_a_checkerboard(disk, tmp_path, capsys) -> None:
+    target = tmp_path / "out.obj"
+    status, out, err = run(["unwrap", str(disk), "--out", str(target), *TINY], capsys)
+    assert (status, err) == (0, "")
+    assert "4 iterations" in out
+    mesh, parameterization = files.read_parameterized(target)
+    assert np.array_equal(mesh.faces, irregular_disk().faces)
+    assert len(parameterization.corners) == len(mesh.faces)
+    assert target.with_suffix(".png").is_file()
+    assert "map_Kd out.png" in target.with_suffix(".mtl").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["fit", "missing.ply", "--out", "m"], "missing.ply"),
+        (["fit", "CLOUD", "--out", "m", "--preset", "best"], "no preset 'best'"),
+        (["fit", "CLOUD", "--out", "m", "--points", "12"], "points must be"),
+        (["fit", "CLOUD", "--out", "m", "--distortion-weight", "-1"], "distortion_weight must be"),
+        (["fit", "CLOUD", "--out", "CLOUD"], "--out names a folder"),
+        (["fit", "CLOUD"], "Missing option '--out'"),
+        (["unwrap", "CLOUD", "--out", "map.txt"], "cannot write this ending"),
+        (["unwrap", "CLOUD", "--out", "no/where.obj"], "there is no such folder"),
+        (["map", "m", "CLOUD", "--out", "map.obj"], "no saved model here"),
+    ],
+)
+def test_wrong_use_is_one_line_and_nothing_written(
+    arguments, message, cloud, monkeypatch, capsys
+) -> None:
+    tmp_path = cloud.parent
+    monkeypatch.chdir(tmp_path)
+    before = sorted(tmp_path.rglob("*"))
+    status, out, err = run([str(cloud) if a == "CLOUD" else a for a in arguments], capsys)
+    assert (status, out) == (2, "")
+    assert message in err
+    assert err.count("\n") == 1
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_too_few_points_are_one_line(tmp_path, capsys) -> None:
+    path = tmp_path / "few.xyz"
+    np.savetxt(path, np.random.default_rng(0).normal(size=(99, 3)))
+    status, _, err = run(["fit", str(path), "--out", str(tmp_path / "m"), *TINY], capsys)
+    assert status == 2
+    assert "99 distinct points; a fit needs at least 100" in err
+    assert not (tmp_path / "m").exists()
+
+
+def strip() -> tuple[Mesh, np.ndarray]:
+    """A flat strip of 2 x 20 squares and its map, the columns right of the tenth moved far away."""
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(21.0), np.arange(3.0), indexing="ij"))
+    corner = np.arange(63).reshape(21, 3)
+    a, b, c, d = corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]
+    faces = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
+    uv = np.stack([x, y], axis=1)
+    uv[x > 10] += [30.0, 50.0]
+    return Mesh(np.stack([x, y, 0 * x], axis=1), faces), uv
+
+
+def test_spanning_edges_are_those_across_the_tear() -> None:
+    mesh, uv = strip()
+    across = np.isclose(mesh.vertices[mesh.edges][:, :, 0].sum(axis=1), 21)
+    assert np.array_equal(spanning_edges(mesh, uv), across)
+    assert across.sum() == 5  # three straight ones and two diagonals
+
+
+def test_a_face_that_spans_the_seam_keeps_its_shape_at_one_bank() -> None:
+    mesh, uv = strip()
+    result = opened(mesh, uv)
+    images, real = result.uv[result.corners], mesh.vertices[mesh.faces][:, :, :2]
+    # The map is an isometry on each side, so every face now has its own shape.
+    sides = np.roll(images, -1, axis=1) - images
+    np.testing.assert_allclose(
+        np.linalg.norm(sides, axis=2), np.linalg.norm(np.roll(real, -1, axis=1) - real, axis=2)
+    )
+    assert len(result.uv) == len(uv) + 4
+    assert np.array_equal(result.uv[:63], uv)
+    moved = (result.corners != mesh.faces).any(axis=1)
+    assert moved.sum() == 4
+    assert len(result.seams(mesh)) == 3  # two of the five edges across are on the boundary
+
+
+def test_a_face_of_three_spanning_edges_becomes_a_chart() -> None:
+    mesh, _ = strip()
+    x, y = mesh.vertices[:, 0], mesh.vertices[:, 1]
+    uv = mesh.vertices[:, :2].copy()
+    uv[(x > 10) & (y < 2)] += [300, 0]
+    uv[(x > 10) & (y == 2)] += [0, 500]
+    spans = spanning_edges(mesh, uv)[mesh.edge_of_halfedge].reshape(-1, 3)
+    assert spans.all(axis=1).sum() == 1  # where the three parts meet
+    result = opened(mesh, uv)
+    corners = result.corners[spans.all(axis=1)][0]
+    assert not set(corners) & set(range(63))
+    a, b, c = result.uv[corners]
+    sides = sorted(float(np.linalg.norm(edge)) for edge in (a - b, b - c, c - a))
+    np.testing.assert_allclose(sides, [1, 1, np.sqrt(2)])
+
+
+def test_a_map_without_a_seam_stays_as_it_is() -> None:
+    mesh, _ = strip()
+    result = opened(mesh, mesh.vertices[:, :2])
+    assert np.array_equal(result.corners, mesh.faces)
+
+
+def test_the_checkerboard_alternates() -> None:
+    board = cli.checkerboard(4, 8)
+    assert board.shape == (32, 32, 3)
+    assert (board[0, 0] == board[8, 8]).all()
+    assert (board[0, 0] != board[0, 8]).all()
+
+
+def test_a_diverged_fit_is_one_line(cloud, tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.setattr("parapoint.trainer.Trainer._step", lambda _: {"total": float("nan")})
+    status, _, err = run(["fit", str(cloud), "--out", str(tmp_path / "m"), *TINY], capsys)
+    assert status == 2
+    assert "diverged twice" in err
+
+
+def test_bad_input_is_an_input_error() -> None:
+    assert issubclass(InputError, ValueError)

@@ -1,0 +1,262 @@
+import json
+import logging
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from parapoint import InputError, Mesh, ParaPoint, PointCloud, presets
+from parapoint.estimator import training_points
+from parapoint.networks import Networks
+from parapoint.presets import PRESETS
+from parapoint.testing import check_method, irregular_disk
+
+TINY = {"preset": "paper", "points": 150, "subset": 100, "iterations": 6, "device": "cpu"}
+
+
+def paraboloid(count: int = 400) -> np.ndarray:
+    xy = np.random.default_rng(0).uniform(-1, 1, (count, 2))
+    return np.column_stack([xy, 0.3 * (xy**2).sum(axis=1)]) * 7 + [10.0, -5.0, 2.0]
+
+
+@pytest.fixture(scope="module")
+def fitted() -> ParaPoint:
+    return ParaPoint(**TINY).fit(paraboloid())
+
+
+def test_it_keeps_the_promises_of_a_method() -> None:
+    check_method(ParaPoint(**{**TINY, "iterations": 2}))
+
+
+def test_every_preset_runs() -> None:
+    for name in PRESETS:
+        model = ParaPoint(**{**TINY, "preset": name, "iterations": 2}).fit(paraboloid())
+        assert np.isfinite(model.transform(paraboloid())).all()
+
+
+def test_parameters_follow_scikit_learn() -> None:
+    model = ParaPoint(points=500)
+    assert ParaPoint(**model.get_params()) == model
+    assert model.set_params(seed=3, branches="3d") is model
+    assert (model.seed, model.branches) == (3, "3d")
+    with pytest.raises(InputError, match="no parameter 'speed'"):
+        model.set_params(speed=1)
+    assert not [name for name in vars(model) if name.endswith("_")]
+
+
+def test_none_takes_the_preset_s_value() -> None:
+    model = ParaPoint(preset="paper")
+    assert model._checked()[0] == PRESETS["paper"]
+    changed = ParaPoint(preset="paper", distortion="isometric", distortion_weight=1e-4)._checked()
+    assert (changed[0].distortion, changed[0].distortion_weight) == ("isometric", 1e-4)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"preset": "best"}, "no preset 'best'; there are: paper"),
+        ({"points": 50}, "points must be a whole number of at least 100, not 50"),
+        ({"iterations": 0}, "iterations must be"),
+        ({"iterations": 2.5}, "iterations must be"),
+        ({"time_budget": -1.0}, "time_budget must be"),
+        ({"time_budget": math.nan}, "time_budget must be"),
+        ({"distortion_weight": -0.1}, "distortion_weight must be a number of at least 0"),
+        ({"distortion": "authalic"}, "distortion must be one of conformal, isometric"),
+        ({"branches": "4d"}, "branches must be one of both, 3d, 2d"),
+        ({"all_from": 1.5}, "all_from must lie between 0 and 1"),
+        ({"seed": -1}, "seed must be"),
+        ({"device": "abacus"}, "device must be auto, cpu or cuda"),
+    ],
+)
+def test_a_wrong_parameter_is_one_line(parameters: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError, match=message) as error:
+        ParaPoint(**parameters).fit(paraboloid())
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        (np.repeat(paraboloid(60), 5, axis=0), "60 distinct points; a fit needs at least 100"),
+        (np.outer(np.linspace(0, 1, 500), [1.0, 2.0, 3.0]), "on a line"),
+        (np.full((500, 3), math.nan), "0 distinct points"),
+        (np.zeros((500, 2)), r"shape \(n, 3\)"),
+    ],
+)
+def test_points_that_are_no_surface_are_one_line(points: np.ndarray, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        ParaPoint(**TINY).fit(points)
+
+
+def test_planar_points_can_be_fitted() -> None:
+    flat = paraboloid() * [1, 1, 0]
+    uv = ParaPoint(**TINY).fit(flat).transform(flat)
+    assert np.linalg.matrix_rank(uv - uv.mean(axis=0)) == 2
+
+
+def test_rows_that_are_not_finite_are_dropped_and_counted(caplog) -> None:
+    points = paraboloid()
+    holed = np.insert(points, 7, [math.nan, 0, 0], axis=0)
+    with caplog.at_level(logging.WARNING, logger="parapoint"):
+        model = ParaPoint(**TINY).fit(holed)
+    assert "dropped 1 of 401 points" in caplog.text
+    assert np.array_equal(model.points_, ParaPoint(**TINY).fit(points).points_)
+
+
+def test_training_points_come_from_the_vertices_or_from_the_faces_where_these_are_few() -> None:
+    disk = irregular_disk()
+    points = training_points(disk, 150, 0)
+    assert len(points) == 150
+    rng = np.random.default_rng(1)
+    many = rng.uniform(size=(3000, 3))
+    mesh = Mesh(many, np.arange(2700).reshape(-1, 3))  # 300 vertices are in no face
+    drawn = training_points(mesh, 500, 0)
+    used = {tuple(row) for row in many[:2700]}
+    assert len({tuple(row) for row in drawn}) == 500
+    assert all(tuple(row) in used for row in drawn)
+    assert len(training_points(mesh, 10_000, 0)) == 2700
+    assert not np.array_equal(training_points(mesh, 500, 1), drawn)
+
+
+def test_a_similar_cloud_gets_a_similar_map() -> None:
+    # Scaled by a power of two, the networks see the same numbers.
+    points = paraboloid()
+    first = ParaPoint(**TINY).fit(points).transform(points)
+    second = ParaPoint(**TINY).fit(4 * points).transform(4 * points)
+    np.testing.assert_allclose(second, 4 * first, rtol=1e-6)
+
+
+def test_transform_goes_in_batches(fitted: ParaPoint, monkeypatch) -> None:
+    points = paraboloid(700)
+    whole = fitted.transform(points)
+    sizes = []
+    keep = Networks.parameterization
+
+    def counted(self: Networks, x: torch.Tensor) -> torch.Tensor:
+        sizes.append(len(x))
+        return keep(self, x)
+
+    monkeypatch.setattr(Networks, "parameterization", counted)
+    monkeypatch.setattr("parapoint.estimator.BATCH", {"cpu": 256})
+    # Products of other sizes round differently, in float32.
+    np.testing.assert_allclose(fitted.transform(points), whole, rtol=1e-4, atol=1e-4)
+    assert sizes == [256, 256, 188]
+    assert fitted.transform(np.empty((0, 3))).shape == (0, 2)
+
+
+def test_the_inverse_is_the_networks_own(fitted: ParaPoint) -> None:
+    uv = fitted.transform(paraboloid())
+    with torch.no_grad():
+        raw = fitted.networks_.surface(torch.from_numpy(uv / fitted.scale_).float()).numpy()
+    points = fitted.inverse_transform(uv)
+    np.testing.assert_allclose(points, raw * fitted.scale_ + fitted.centre_, rtol=1e-5)
+
+
+def test_seams_are_where_neighbours_are_far_apart_in_the_plane(fitted, monkeypatch) -> None:
+    # A strip of 300 points in a row is torn between the points 149 and 150.
+    x = np.arange(300.0)
+    points = np.column_stack([x, 0 * x, 0 * x])
+    uv = np.column_stack([np.where(x < 150, 0.4 * x, 0.4 * x + 400), 0 * x])
+    monkeypatch.setattr(ParaPoint, "transform", lambda *_: uv)
+    # Each point sees the nearest 3 of its neighbours: beyond the tear from 148 (or 149) to 151.
+    found = np.flatnonzero(fitted.seams(points))
+    assert {149, 150} <= set(found) <= {148, 149, 150, 151}
+    with pytest.raises(InputError, match="more than 3 points"):
+        fitted.seams(points[:3])
+
+
+def test_nothing_works_before_a_fit(tmp_path) -> None:
+    for use in (
+        lambda: ParaPoint().transform(np.zeros((1, 3))),
+        lambda: ParaPoint().inverse_transform(np.zeros((1, 2))),
+        lambda: ParaPoint().seams(),
+        lambda: ParaPoint().save(tmp_path),
+    ):
+        with pytest.raises(InputError, match="not fitted"):
+            use()
+
+
+def test_a_saved_model_maps_as_before(fitted: ParaPoint, tmp_path) -> None:
+    fitted.save(tmp_path)
+    loaded = ParaPoint.load(tmp_path, device="cpu")
+    assert loaded == fitted
+    assert loaded.preset_ == fitted.preset_
+    assert np.array_equal(loaded.transform(paraboloid()), fitted.transform(paraboloid()))
+    assert np.array_equal(loaded.seams(), fitted.seams())
+    assert [t.values for t in loaded.trace_] == [t.values for t in fitted.trace_]
+    fitted.save(tmp_path)
+    assert len(list(tmp_path.glob("*"))) == 2
+
+
+def test_a_model_of_another_version_or_a_damaged_one_is_one_line(fitted, tmp_path) -> None:
+    with pytest.raises(InputError, match="no saved model"):
+        ParaPoint.load(tmp_path)
+    fitted.save(tmp_path)
+    text = (tmp_path / "model.json").read_text()
+    (tmp_path / "model.json").write_text(json.dumps({**json.loads(text), "format": 99}))
+    with pytest.raises(InputError, match="format version 99; this parapoint reads version 1"):
+        ParaPoint.load(tmp_path)
+    (tmp_path / "model.json").write_text(text[:-20])
+    with pytest.raises(InputError, match="damaged"):
+        ParaPoint.load(tmp_path)
+    (tmp_path / "model.json").write_text(text)
+    tensors = next(tmp_path.glob("*.safetensors"))
+    tensors.write_bytes(tensors.read_bytes()[:100])
+    with pytest.raises(InputError, match="damaged"):
+        ParaPoint.load(tmp_path)
+
+
+class KilledError(Exception):
+    pass
+
+
+def test_a_killed_fit_goes_on_where_it_was(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr("parapoint.estimator.CHECKPOINT_SECONDS", 0.0)
+    points = paraboloid()
+    whole = ParaPoint(**TINY).fit(points)
+    seen = []
+
+    def kill(progress) -> None:
+        seen.append(progress.step.iteration)
+        if progress.step.iteration == 4:
+            raise KilledError
+
+    with pytest.raises(KilledError):
+        ParaPoint(**TINY).fit(points, checkpoint=tmp_path, callback=kill)
+    assert sorted(path.suffix for path in tmp_path.glob("*")) == [".json", ".safetensors"]
+    seen.clear()
+    with pytest.raises(InputError, match="other points or settings"):
+        ParaPoint(**{**TINY, "seed": 1}).fit(points, checkpoint=tmp_path)
+    model = ParaPoint(**TINY).fit(
+        points, checkpoint=tmp_path, callback=lambda now: seen.append(now.step.iteration)
+    )
+    assert seen == [5, 6]
+    assert np.array_equal(model.transform(points), whole.transform(points))
+    assert [t.values for t in model.trace_] == [t.values for t in whole.trace_]
+    assert not list(tmp_path.glob("*"))
+
+
+def test_a_time_budget_ends_the_fit() -> None:
+    model = ParaPoint(**{**TINY, "iterations": 10**6, "time_budget": 0.3}).fit(paraboloid())
+    assert 1 <= model.report_["iterations"] < 10**4
+    assert np.isfinite(model.transform(paraboloid())).all()
+
+
+def test_the_report_and_the_trace_say_what_was_done() -> None:
+    cloud = PointCloud(paraboloid())
+    result = ParaPoint(**TINY).parameterize(cloud, seed=5)
+    expected = {"preset": "paper", "points": 150, "iterations": 6, "device": "cpu", "warm_up": 0.1}
+    assert expected.items() <= result.report.items()
+    assert result.report["weights"]["wrap"] == presets.PAPER.wrap_weight
+    assert [point.iteration for point in result.trace] == [1, 2, 3, 4, 5, 6]
+    assert {"wrap", "cycle", "total"} <= result.trace[0].values.keys()
+    maps = [point.uv for point in result.trace if point.uv is not None]
+    assert len(maps) > 1
+    assert all(uv.shape == (400, 2) for uv in maps)
+
+
+def test_threads_are_as_before_after_a_fit() -> None:
+    before = torch.get_num_threads()
+    ParaPoint(**TINY, threads=1).fit(paraboloid())
+    assert torch.get_num_threads() == before

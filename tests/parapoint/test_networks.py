@@ -1,0 +1,123 @@
+import itertools
+
+import numpy as np
+import pytest
+import torch
+
+from parapoint.networks import ACTIVATIONS, Activation, Networks, OffsetStack, Stack, products
+
+HIDDEN = (64, 128, 512, 128)
+
+
+def generator() -> torch.Generator:
+    return torch.Generator().manual_seed(0)
+
+
+def networks(activation: str = "leaky_relu", hidden: tuple[int, ...] = HIDDEN) -> Networks:
+    return Networks(hidden, 64, ACTIVATIONS[activation], generator())
+
+
+def plain(stack: Stack, x: torch.Tensor) -> torch.Tensor:
+    """A stack written with torch's own layers."""
+    functions = {
+        ACTIVATIONS["leaky_relu"]: lambda z: torch.nn.functional.leaky_relu(z, 0.01),
+        ACTIVATIONS["softplus"]: lambda z: torch.nn.functional.softplus(z, 10.0),
+    }
+    layers = list(stack.layers)
+    for i in range(0, len(layers), 2):
+        x = torch.nn.functional.linear(x, layers[i], layers[i + 1])
+        if i + 2 < len(layers):
+            x = functions[stack.activation](x)
+    return x
+
+
+def parameter_count(module: torch.nn.Module) -> int:
+    return sum(p.numel() for p in module.parameters())
+
+
+def test_the_sub_networks_have_the_sizes_of_the_paper() -> None:
+    def phi(i: int, o: int) -> int:
+        sizes = (i, 64, 128, 512, 128, o)
+        return sum(a * b + b for a, b in itertools.pairwise(sizes))
+
+    assert phi(3, 2) == 256 + 8_320 + 66_048 + 65_664 + 258  # the five layers by hand
+    net = networks()
+    assert parameter_count(net.unwrap) == phi(3, 2)
+    assert parameter_count(net.wrap) == phi(2, 3)
+    assert parameter_count(net.stitch) == phi(3, 3)
+    assert parameter_count(net.deform) == phi(2, 64) + phi(66, 2)
+    assert parameter_count(net.cut) == phi(3, 64) + phi(67, 3)
+
+
+def test_products_count_each_weight_once_for_a_point_and_each_tangent() -> None:
+    # One stack of hidden size 1 and its two weights: all can be added up by hand.
+    net = Networks((1,), 1, ACTIVATIONS["leaky_relu"], generator())
+    cut, deform = (3 + 1) + (4 + 3), (2 + 1) + (3 + 2)
+    unwrap, wrap, stitch = 3 + 2, 2 + 3, 3 + 3
+    there, back = cut + unwrap, 3 * (wrap + stitch)
+    assert products(net) == (there + back, deform + back + there)
+
+
+@pytest.mark.parametrize("activation", ACTIVATIONS)
+def test_a_stack_is_what_torch_makes_of_its_layers(activation: str) -> None:
+    stack = Stack(3, 2, (5, 7), ACTIVATIONS[activation], generator()).double()
+    x = torch.randn(11, 3, generator=generator(), dtype=torch.float64)
+    torch.testing.assert_close(stack(x[None])[0], plain(stack, x))
+
+
+@pytest.mark.parametrize("activation", ACTIVATIONS)
+def test_tangents_are_columns_of_the_jacobian(activation: str) -> None:
+    stack = OffsetStack(3, 4, (5, 7), ACTIVATIONS[activation], generator()).double()
+    x = torch.randn(6, 3, generator=generator(), dtype=torch.float64)
+    axes = torch.eye(3, dtype=torch.float64)[:, None].expand(3, 6, 3)
+    pushed = stack(torch.cat([x[None], axes]))[1:]
+    for i in range(6):
+        jacobian = torch.autograd.functional.jacobian(lambda p: stack(p[None, None])[0, 0], x[i])
+        torch.testing.assert_close(pushed[:, i].T, jacobian)
+
+
+@pytest.mark.parametrize("activation", ACTIVATIONS.values(), ids=ACTIVATIONS)
+def test_the_gradient_of_a_function_of_values_and_tangents(activation: Activation) -> None:
+    stack = Stack(2, 3, (5, 4), activation, generator()).double()
+    x = torch.randn(3, 7, 2, generator=generator(), dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradcheck(lambda x, *_: stack(x), (x, *stack.layers), eps=1e-7, atol=1e-5)
+
+
+def test_both_branches_are_the_compositions_of_the_paper() -> None:
+    net = networks()
+    points = torch.randn(9, 3, generator=generator())
+    grid = torch.rand(4, 2, generator=generator())
+    there, back = net(points, grid)
+    torch.testing.assert_close(there.cut, net.cut(points[None])[0])
+    torch.testing.assert_close(there.uv, net.unwrap(there.cut[None])[0])
+    torch.testing.assert_close(there.uv, net.parameterization(points))
+    torch.testing.assert_close(there.cut_cycle, net.wrap(there.uv[None])[0])
+    torch.testing.assert_close(there.points_cycle, net.stitch(there.cut_cycle[None])[0])
+    torch.testing.assert_close(back.uv, net.deform(grid[None])[0])
+    torch.testing.assert_close(back.cut, net.wrap(back.uv[None])[0])
+    torch.testing.assert_close(back.points, net.surface(back.uv))
+    torch.testing.assert_close(back.cut_cycle, net.cut(back.points[None])[0])
+    torch.testing.assert_close(back.uv_cycle, net.unwrap(back.cut_cycle[None])[0])
+    jacobian = torch.autograd.functional.jacobian(lambda q: net.surface(q[None])[0], there.uv[5])
+    torch.testing.assert_close(there.tangents[:, 5].T, jacobian, rtol=1e-4, atol=1e-6)
+    jacobian = torch.autograd.functional.jacobian(lambda q: net.surface(q[None])[0], back.uv[2])
+    torch.testing.assert_close(back.tangents[:, 2].T, jacobian, rtol=1e-4, atol=1e-6)
+
+
+def test_a_branch_can_be_left_out() -> None:
+    net = networks(hidden=(4,))
+    points, grid = torch.zeros(5, 3), torch.zeros(3, 2)
+    both, there, back = net(points, grid), net(points, None), net(None, grid)
+    assert there.grid is None
+    assert back.point is None
+    torch.testing.assert_close(there.point.points_cycle, both.point.points_cycle)
+    torch.testing.assert_close(back.grid.uv_cycle, both.grid.uv_cycle)
+
+
+def test_weights_come_from_the_generator_alone() -> None:
+    before = torch.get_rng_state()
+    first, second = networks(), networks()
+    assert torch.equal(torch.get_rng_state(), before)
+    for a, b in zip(first.parameters(), second.parameters(), strict=True):
+        assert torch.equal(a, b)
+        assert float(a.detach().abs().max()) <= 1 / np.sqrt(2)
