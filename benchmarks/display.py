@@ -6,7 +6,7 @@ import statistics
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
@@ -77,11 +77,16 @@ class Display(Progress):
         if row.status in BAD and not self._bar.disable:
             self._bar.console.print(escape(f"{cell.row.case} {cell.spec}: {ending(row)}"))
 
+    def measured(self, done: int, total: int) -> None:
+        """Show how far the metrics are."""
+        self._bar.update(self._task, description="metrics", completed=done, total=total)
+
     def tick(self) -> None:
         """Show for how long the cells have been running."""
         now = time.monotonic()
         running = (f"{name} {now - began:.0f} s" for name, began in self._running.values())
-        self._bar.update(self._task, description=escape(", ".join(running)))
+        if self._running:
+            self._bar.update(self._task, description=escape(", ".join(running)))
 
 
 def ending(row: ResultRow) -> str:
@@ -106,7 +111,7 @@ def print_summary(summary: Summary) -> None:
         table.add_column(status.replace("_", " "), justify="right")
     table.add_column("median seconds", justify="right")
     table.add_column("median MB", justify="right")
-    for method, rows in _by_method(summary.rows).items():
+    for method, rows in _by_method(summary).items():
         counts = Counter[str](row.status for row in rows)
         table.add_row(
             Text(method),
@@ -117,9 +122,12 @@ def print_summary(summary: Summary) -> None:
     print_table(table)
     bad = [row for row in summary.rows if row.status in BAD]
     for row in bad[:LISTED]:
-        print(f"{row.case}, {label(row)}: {ending(row)}")
+        print(f"{row.case}, {summary.spec(row)}: {ending(row)}")
     if len(bad) > LISTED:
         print(f"and {len(bad) - LISTED} more that did not end well: see runs.jsonl")
+    names = {row.id: f"{row.case}, {summary.spec(row)}" for row in summary.rows}
+    for row_id, reason in summary.unmeasured.items():
+        print(f"{names.get(row_id, row_id)}: no metrics: {reason}")
     for case, reason in summary.missing.items():
         print(f"{case} is left out: {reason}")
     if summary.ran:
@@ -128,12 +136,6 @@ def print_summary(summary: Summary) -> None:
             f"{len(summary.ran)} cells in {summary.seconds:.1f} s, "
             f"of which the harness took {harness:.1f} s"
         )
-
-
-def label(row: ResultRow) -> str:
-    """The method of a row with its parameters."""
-    params = ", ".join(f"{name}={value!r}" for name, value in row.params.items())
-    return f"{row.method}({params})" if params else row.method
 
 
 def print_table(table: Table) -> None:
@@ -151,11 +153,11 @@ def print_table(table: Table) -> None:
     sys.stdout.flush()
 
 
-def _by_method(rows: Iterable[ResultRow]) -> dict[str, list[ResultRow]]:
-    """Rows by method and parameters."""
+def _by_method(summary: Summary) -> dict[str, list[ResultRow]]:
+    """Rows by method as it was asked for."""
     groups: dict[str, list[ResultRow]] = {}
-    for row in rows:
-        groups.setdefault(label(row), []).append(row)
+    for row in summary.rows:
+        groups.setdefault(summary.spec(row), []).append(row)
     return groups
 
 

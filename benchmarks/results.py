@@ -53,6 +53,11 @@ FORMAT = 1
 
 IDENTITY_COLUMNS = ("suite", "case", "method", "params", "seed", "status")
 _NAME = re.compile(r"[0-9a-f]{8,64}")
+_DAMAGE = (
+    *(OSError, EOFError, ValueError, TypeError, AttributeError, KeyError, MemoryError),
+    *(NotImplementedError, zipfile.BadZipFile, zlib.error),
+)
+"""What reading a damaged archive raises."""
 _log = logging.getLogger("parapoint")
 
 
@@ -227,11 +232,12 @@ def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
         InputError: the file is missing or damaged.
     """
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        # Opened here: numpy leaves the file open where it is no archive.
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
     except FileNotFoundError:
         raise InputError(f"{path}: missing") from None
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+    except _DAMAGE as error:
         raise InputError(f"{path}: damaged ({error})") from None
     return {
         name: array.astype(np.int64) if array.dtype == np.int32 else array
@@ -395,48 +401,49 @@ class Store:
         """
         if not row.uv_sha256:
             raise InputError(f"{row.case}, {row.method}: no map is stored ({row.status})")
-        path = self.uv_path(row.id)
-        arrays = read_arrays(path)
-        try:
-            trace = _trace(arrays)
-            if "corners" in arrays:
-                return Parameterization(arrays["uv"], arrays["corners"], trace, row.report)
-            return PointParameterization(arrays["uv"], trace, row.report)
-        except (InputError, KeyError, IndexError, ValueError, TypeError) as error:
-            raise InputError(f"{path}: damaged ({error})") from None
+        return read_map(self.uv_path(row.id), row.report)
 
-    def metrics(self) -> pd.DataFrame:
+    def unmeasured(self) -> list[ResultRow]:
+        """The rows with a map whose metrics are not in `metrics.parquet`, or of an older source."""
+        known = self._known_metrics()
+        source = _metrics_source()
+        return [
+            row for row in self.rows() if row.uv_sha256 and _metrics_key(row, source) not in known
+        ]
+
+    def metrics(self, measured: Mapping[str, Mapping[str, float]] | None = None) -> pd.DataFrame:
         """One row a cell: suite, case, method, params, seed, status, every metric by name, id.
 
         `params` is a JSON string; a metric that does not apply is null. Computed from the stored
         maps, only for what is missing in or has changed since `metrics.parquet`, which is updated.
+
+        Args:
+            measured: values by row id that were computed elsewhere; none in it, nulls in the table.
         """
         import pandas as pd
 
         names = _metric_names()
         known = self._known_metrics()
         source = _metrics_source()
-        records = []
+        records: list[dict[str, object]] = []
         added = False
         for row in self.rows():
             key = _metrics_key(row, source)
             if key in known:
                 values = known[key]
             else:
-                values = self._measured(row)
+                given = (measured or {}).get(row.id)
+                values = self._measured(row) if given is None else dict(given)
                 added = True
             cell = (row.suite, row.case, row.method, json.dumps(row.params), row.seed, row.status)
-            records.append(
-                dict(zip(IDENTITY_COLUMNS, cell, strict=True))
-                | values
-                | {"id": row.id, "metrics_key": key}
-            )
+            start = dict(zip(IDENTITY_COLUMNS, cell, strict=True))
+            records.append({**start, **values, "id": row.id, "metrics_key": key})
         extra = {name for record in records for name in record}
         extra -= {*IDENTITY_COLUMNS, *names, "id", "metrics_key"}
-        measured = [*names, *sorted(extra)]
-        columns = [*IDENTITY_COLUMNS, *measured, "id", "metrics_key"]
+        numbers = [*names, *sorted(extra)]
+        columns = [*IDENTITY_COLUMNS, *numbers, "id", "metrics_key"]
         frame = pd.DataFrame.from_records(records, columns=columns)
-        frame = frame.astype(dict.fromkeys(measured, "float64") | {"seed": "int64"})
+        frame = frame.astype(dict.fromkeys(numbers, "float64") | {"seed": "int64"})
         if added or len(known) != len(records):
             self._write_metrics(frame)
         return frame
@@ -531,20 +538,11 @@ class Store:
         """Every metric of a row's map; none where it has no map or its files are damaged."""
         if not row.uv_sha256:
             return {}
-        from benchmarks import metrics
-
         try:
-            surface = self.surface(row)
-            result = self.result(row)
-            if isinstance(surface, Mesh) and isinstance(result, Parameterization):
-                return dict(metrics.evaluate(surface, result))
-            if isinstance(surface, PointCloud) and isinstance(result, PointParameterization):
-                return dict(metrics.evaluate_points(surface, result))
+            return measured(self.surface(row), self.result(row))
         except InputError as error:
             _log.warning("%s, %s: no metrics: %s", row.case, row.method, error)
             return {}
-        _log.warning("%s, %s: no metrics: the map is of another kind", row.case, row.method)
-        return {}
 
     def surface_path(self, surface_hash: str) -> Path:
         """Where the surface of that hash lies."""
@@ -672,6 +670,41 @@ def read_surface(path: Path) -> Surface:
         return PointCloud(arrays["points"], arrays.get("normals"))
     except (InputError, KeyError) as error:
         raise InputError(f"{path}: damaged ({error})") from None
+
+
+def read_map(
+    path: Path, report: Mapping[str, object] | None = None
+) -> Parameterization | PointParameterization:
+    """The map in a file of the store, with its trace.
+
+    Raises:
+        InputError: the file is missing or damaged.
+    """
+    arrays = read_arrays(path)
+    try:
+        trace = _trace(arrays)
+        if "corners" in arrays:
+            return Parameterization(arrays["uv"], arrays["corners"], trace, report or {})
+        return PointParameterization(arrays["uv"], trace, report or {})
+    except (InputError, KeyError, IndexError, ValueError, TypeError) as error:
+        raise InputError(f"{path}: damaged ({error})") from None
+
+
+def measured(
+    surface: Surface, result: Parameterization | PointParameterization
+) -> dict[str, float]:
+    """Every metric of a map.
+
+    Raises:
+        InputError: the map is not one of this surface.
+    """
+    from benchmarks import metrics
+
+    if isinstance(surface, Mesh) and isinstance(result, Parameterization):
+        return metrics.evaluate(surface, result)
+    if isinstance(surface, PointCloud) and isinstance(result, PointParameterization):
+        return metrics.evaluate_points(surface, result)
+    raise InputError("a map of a mesh for a point cloud, or the other way round")
 
 
 def _metrics_key(row: ResultRow, source: str) -> str:

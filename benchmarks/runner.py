@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import json
+import math
 import os
 import selectors
 import shutil
@@ -16,11 +17,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, cast
+from types import TracebackType
+from typing import Any, Self, cast
 
 import psutil
 
@@ -33,6 +35,8 @@ from parapoint.surface import Surface
 
 TIME_LIMIT = 1800.0
 """Seconds a cell may take unless said otherwise."""
+METRICS_TIME_LIMIT = 120.0
+"""Seconds that the metrics of one map may take; on real maps of 100k faces they take a few."""
 GRACE = 15.0
 """Seconds past its limit after which a supervisor itself counts as hung."""
 OUTPUT_KEPT = 1 << 16
@@ -78,21 +82,36 @@ class Summary:
 
     Attributes:
         suite: the suite, with the cases, methods and seeds that were asked for.
+        methods: its methods.
         ran: rows of the cells that ran, in the order in which they ended.
         reasons: how many cells ran for which reason.
         kept: rows of the cells that needed no run.
         missing: the cases whose model could not be had, and how to get each.
+        unmeasured: ids of the rows whose metrics could not be computed, and why.
         seconds: wall time of the run.
         method_seconds: wall time spent in methods, all cells together, / jobs.
     """
 
     suite: Suite
+    methods: Sequence[Chosen]
     ran: list[ResultRow] = field(default_factory=list)
     reasons: Counter[str] = field(default_factory=Counter)
     kept: list[ResultRow] = field(default_factory=list)
     missing: dict[str, str] = field(default_factory=dict)
+    unmeasured: dict[str, str] = field(default_factory=dict)
     seconds: float = 0.0
     method_seconds: float = 0.0
+
+    def spec(self, row: ResultRow) -> str:
+        """The method of a row as it was asked for."""
+        return next(
+            (
+                method.spec
+                for method in self.methods
+                if (method.name, method.params) == (row.method, row.params)
+            ),
+            row.method,
+        )
 
     @property
     def rows(self) -> list[ResultRow]:
@@ -111,6 +130,9 @@ class Progress:
 
     def ended(self, cell: Cell, row: ResultRow) -> None:
         """A cell has its row."""
+
+    def measured(self, done: int, total: int) -> None:
+        """After the cells: the metrics of `done` maps of `total` are known."""
 
     def tick(self) -> None:
         """Called some times a second."""
@@ -137,7 +159,7 @@ def run(
         methods: specs, such as "slim" or "slim(iterations=1)".
         cases: names of models or paths of files.
         seeds: seeds, each a run of every method.
-        plugins: "FILE.py:Class" of methods to add; without `methods` they join the suite's.
+        plugins: "FILE.py:Class" of methods to add, which run as well.
         jobs: cells at a time. More than one is faster and makes timings less honest.
         timeout: seconds a cell may take.
         memory: GB a cell's processes may hold; None: four fifths of the machine's, / jobs.
@@ -157,8 +179,8 @@ def run(
         "memory_limit": memory * 1e9 if memory else 0.8 * environment.memory() / jobs,
     }
     threads = environment.threads(jobs)
-    summary = Summary(suite)
-    with store.writing():
+    summary = Summary(suite, chosen)
+    with store.writing(), _Pool(store.folder / "cells", threads, progress) as pool:
         surfaces = _surfaces(store, suite.cases, loaded, summary)
         here = environment.environment() | limits | {"jobs": jobs, "threads": threads}
         todo = list(_todo(suite, chosen, surfaces, store=store, here=here, summary=summary))
@@ -166,17 +188,52 @@ def run(
         if todo:
             number = store.add_run(here | {"suite": suite.name})
             book = _Book(store, number, summary, progress)
-            present = [cell for cell in todo if cell.row.surface_hash]
+            job = limits | {"plugins": [_absolute(plugin) for plugin in plugins]}
+            tasks = [book.task(cell, job) for cell in todo if cell.row.surface_hash]
             for cell in todo:
                 if not cell.row.surface_hash:
-                    reason = summary.missing[cell.row.case]
-                    book.write(cell, {"status": "skipped", "reason": reason})
-            job = limits | {"plugins": [_absolute(plugin) for plugin in plugins]}
-            _Pool(book, job, threads).run(present, jobs)
-        store.metrics()
+                    book.write(
+                        cell, {"status": "skipped", "reason": summary.missing[cell.row.case]}
+                    )
+            pool.run(tasks, jobs)
+        _measure(store, pool, summary, progress)
     summary.seconds = time.monotonic() - began
     summary.method_seconds /= jobs
     return summary
+
+
+def _measure(store: Store, pool: _Pool, summary: Summary, progress: Progress) -> None:
+    """Bring the metrics up to date, each map in a child process: a wild map can defeat a metric."""
+    rows = store.unmeasured()
+    values: dict[str, dict[str, float]] = {}
+    # Another supervisor takes a second to start: it must have something to do.
+    jobs = min(environment.cores(), 1 + len(rows) // 4)
+    limits = {
+        "time_limit": METRICS_TIME_LIMIT,
+        "memory_limit": 0.8 * environment.memory() / jobs,
+    }
+
+    def ended(row: ResultRow) -> Callable[[dict[str, Any], str, Path], None]:
+        def note(outcome: dict[str, Any], _: str, __: Path) -> None:
+            values[row.id] = {k: float(v) for k, v in outcome.get("metrics", {}).items()}
+            if outcome["status"] != "ok":
+                summary.unmeasured[row.id] = outcome["reason"]
+            progress.measured(len(values), len(rows))
+
+        return note
+
+    def began() -> None:
+        progress.measured(len(values), len(rows))
+
+    tasks = []
+    for row in rows:
+        files = {
+            "surface": str(store.surface_path(row.surface_hash).resolve()),
+            "measure": str(store.uv_path(row.id).resolve()),
+        }
+        tasks.append(_Task(limits | files, began, ended(row)))
+    pool.run(tasks, jobs)
+    store.metrics(values)
 
 
 def _absolute(plugin: str) -> str:
@@ -194,15 +251,17 @@ def _choice(
 ) -> tuple[Suite, list[Chosen]]:
     """The suite as asked for, every name in it known, and its methods."""
     added = [registry.register_plugin(plugin) for plugin in plugins]
-    specs = tuple(methods) if methods is not None else (*suite.methods, *added)
     chosen = []
-    for spec in dict.fromkeys(specs):
-        name, method = registry.method(spec)
+    made = [(spec, *registry.method(spec)) for spec in dict.fromkeys(methods or suite.methods)]
+    named = {name for _, name, _ in made}
+    made += [(name, *registry.method(name)) for name in added if name not in named]
+    for spec, name, method in made:
         params = plain(dataclasses.asdict(cast("Any", method)))
         chosen.append(Chosen(spec, name, params, registry.source_hash(method)))
     asked = suite.cases if cases is None else cases
     names = tuple(dict.fromkeys(models.canonical_name(case) for case in asked))
     asked_seeds = suite.seeds if seeds is None else tuple(dict.fromkeys(seeds))
+    specs = tuple(method.spec for method in chosen)
     return dataclasses.replace(suite, cases=names, methods=specs, seeds=asked_seeds), chosen
 
 
@@ -325,11 +384,26 @@ def _changed(
     return ""
 
 
+@dataclass(frozen=True)
+class _Task:
+    """Something for a supervisor to do.
+
+    Attributes:
+        job: what the supervisor is told, its limits included.
+        began: called when it is under way.
+        ended: called with its outcome, the last lines printed and the file it may have written.
+    """
+
+    job: Mapping[str, Any]
+    began: Callable[[], None]
+    ended: Callable[[dict[str, Any], str, Path], None]
+
+
 class _Slot:
-    """A supervisor process, and the cell that it is busy with."""
+    """A supervisor process, and the task that it is busy with."""
 
     def __init__(self, threads: int) -> None:
-        """Start a supervisor whose cells may use `threads` threads."""
+        """Start a supervisor whose children may use `threads` threads."""
         self.replies, send = os.pipe()
         variables = dict.fromkeys(THREAD_VARIABLES, str(threads)) | {"PYTHONHASHSEED": "0"}
         self.process = subprocess.Popen(  # noqa: S603  our own module
@@ -352,26 +426,38 @@ class _Slot:
         os.set_blocking(self.replies, False)
         self.reply = bytearray()
         self.printed = bytearray()
-        self.cell: Cell | None = None
+        self.ready = False
+        self.task: _Task | None = None
         self.folder = Path()
+        self.started = 0.0
+
+    @property
+    def time_limit(self) -> float:
+        """Seconds that the task may take."""
+        return float(self.task.job["time_limit"]) if self.task else math.inf
+
+    def give(self, task: _Task, folder: Path) -> None:
+        """Begin a task, which may write into `folder`."""
+        self.printed.clear()
+        self.task = task
+        self.folder = folder
         self.started = time.monotonic()
+        job = {**task.job, "map": str(folder / "map.npz"), "work": str(folder / "work")}
+        with contextlib.suppress(OSError):  # a supervisor that is gone is heard of next
+            self.jobs.write(json.dumps(job).encode() + b"\n")
 
     def hear(self) -> list[dict[str, Any]] | None:
         """Outcomes that have come in; None once the supervisor is gone."""
         content = _available(self.replies)
-        if content is None and not self.reply:
+        if content is None:
             return None
-        self.reply += content or b""
-        *lines, rest = self.reply.split(b"\n")
-        self.reply = bytearray(rest if content is not None else b"")
+        *lines, self.reply = (self.reply + content).split(b"\n")
         return [json.loads(line) for line in lines]
 
     def drain(self) -> None:
         """Take in what was printed, so that no method waits for a reader; keep the end of it."""
-        content = _available(self.output)
-        if content:
-            self.printed += content
-            del self.printed[:-OUTPUT_KEPT]
+        self.printed += _available(self.output) or b""
+        del self.printed[:-OUTPUT_KEPT]
 
     def close(self) -> None:
         """End the supervisor and with it all that runs below it."""
@@ -381,8 +467,7 @@ class _Slot:
             self.process.wait(GRACE / 3)
         except subprocess.TimeoutExpired:
             with contextlib.suppress(psutil.Error):
-                below = psutil.Process(self.process.pid).children(recursive=True)
-                for process in below:
+                for process in psutil.Process(self.process.pid).children(recursive=True):
                     with contextlib.suppress(psutil.Error):
                         process.kill()
             self.process.kill()
@@ -393,7 +478,7 @@ class _Slot:
 
 
 def _available(pipe: int) -> bytes | None:
-    """What can be read from `pipe` at once, one megabyte at most; None at its end."""
+    """What can be read from `pipe` at once, one megabyte or so at most; None at its end."""
     content = bytearray()
     while len(content) < 1 << 20:
         try:
@@ -406,6 +491,108 @@ def _available(pipe: int) -> bytes | None:
     return bytes(content)
 
 
+class _Pool:
+    """Supervisors that work off tasks. A context manager: after it, no process is left."""
+
+    def __init__(self, folder: Path, threads: int, progress: Progress) -> None:
+        """Tasks write into folders below `folder`, which goes with the pool."""
+        self.folder = folder
+        self.threads = threads
+        self.progress = progress
+        self.selector = selectors.DefaultSelector()
+        self.slots: set[_Slot] = set()
+
+    def __enter__(self) -> Self:
+        """Clear what a run that was killed has left."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """End all supervisors and what runs below them."""
+        for slot in self.slots:
+            slot.close()
+        self.selector.close()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def run(self, tasks: Sequence[_Task], jobs: int) -> None:
+        """Do all tasks, `jobs` at a time."""
+        waiting = deque(tasks)
+        jobs = min(jobs, len(tasks))
+        while waiting or self._busy():
+            while len(self.slots) < jobs:
+                self._open()
+            for slot in self.slots:
+                if waiting and slot.ready and not slot.task and self._busy() < jobs:
+                    self._begin(slot, waiting.popleft())
+            self._listen()
+            self.progress.tick()
+
+    def _busy(self) -> int:
+        return sum(slot.task is not None for slot in self.slots)
+
+    def _open(self) -> None:
+        slot = _Slot(self.threads)
+        self.slots.add(slot)
+        self.selector.register(slot.replies, selectors.EVENT_READ, slot)
+        self.selector.register(slot.output, selectors.EVENT_READ, slot)
+
+    def _begin(self, slot: _Slot, task: _Task) -> None:
+        with disk_said(self.folder):
+            self.folder.mkdir(exist_ok=True)
+            folder = Path(tempfile.mkdtemp(dir=self.folder)).resolve()
+            (folder / "work").mkdir()
+        slot.give(task, folder)
+        task.began()
+
+    def _listen(self) -> None:
+        """Wait a moment for news, and deal with it."""
+        for slot in {key.data for key, _ in self.selector.select(0.1)}:
+            news = slot.hear()
+            slot.drain()
+            for outcome in news or ():
+                slot.ready = True
+                if slot.task is not None:
+                    self._end(slot, outcome)
+            if news is None:
+                self._lost(slot)
+        now = time.monotonic()
+        for slot in [slot for slot in self.slots if now > slot.started + slot.time_limit + GRACE]:
+            self._lost(slot)
+
+    def _lost(self, slot: _Slot) -> None:
+        """Deal with a supervisor that is gone or hangs: its task ends with it."""
+        if slot.task is None:
+            said = last_lines(slot.printed, lines=1)
+            raise RuntimeError(f"benchmarks.worker ended unasked: {said}")
+        if time.monotonic() > slot.started + slot.time_limit:
+            reason = f"not done within the limit of {slot.time_limit:g} s, and hard to kill"
+            self._end(slot, {"status": "timeout", "reason": reason})
+        else:
+            reason = "killed the process that watched over it"
+            self._end(slot, {"status": "failed", "reason": reason})
+        self.slots.discard(slot)
+        self.selector.unregister(slot.replies)
+        self.selector.unregister(slot.output)
+        slot.close()
+
+    def _end(self, slot: _Slot, outcome: dict[str, Any]) -> None:
+        task = slot.task
+        assert task is not None
+        slot.task = None
+        if outcome["status"] == "stop":
+            raise InputError(
+                f"{outcome['reason']}; earlier results are intact: mend that and run again"
+            )
+        outcome["took"] = time.monotonic() - slot.started
+        task.ended(outcome, last_lines(slot.printed), slot.folder / "map.npz")
+        shutil.rmtree(slot.folder, ignore_errors=True)
+
+
 class _Book:
     """Where the rows of one run go."""
 
@@ -416,129 +603,34 @@ class _Book:
         self.summary = summary
         self.progress = progress
 
+    def task(self, cell: Cell, shared: Mapping[str, Any]) -> _Task:
+        """What runs a cell and writes its row; `shared` holds the limits and plugins of all."""
+        job = {
+            **shared,
+            "spec": cell.spec,
+            "seed": cell.row.seed,
+            "source_hash": cell.row.source_hash,
+            "surface": str(self.store.surface_path(cell.row.surface_hash).resolve()),
+        }
+
+        def ended(outcome: dict[str, Any], printed: str, path: Path) -> None:
+            took = outcome.pop("took")
+            self.summary.method_seconds += outcome.get("seconds") or took
+            if outcome["status"] == "ok":
+                self.store.add_map(cell.row.id, path)
+                outcome["uv_file"] = f"uv/{cell.row.id}.npz"
+            else:
+                outcome["output"] = printed
+            self.write(cell, outcome)
+
+        return _Task(job, lambda: self.progress.started(cell), ended)
+
     def write(self, cell: Cell, outcome: Mapping[str, Any]) -> None:
         """Write the row of `cell`."""
         row = dataclasses.replace(cell.row, run=self.number, **outcome)
         self.store.append(row)
         self.summary.ran.append(row)
         self.progress.ended(cell, row)
-
-
-class _Pool:
-    """Slots that work off cells."""
-
-    def __init__(self, book: _Book, job: Mapping[str, Any], threads: int) -> None:
-        """`job` holds what all cells share: limits and plugins."""
-        self.book = book
-        self.job = job
-        self.threads = threads
-        self.cells = book.store.folder / "cells"
-        self.selector = selectors.DefaultSelector()
-        self.slots: set[_Slot] = set()
-        self.waiting: Iterator[Cell] = iter(())
-
-    def run(self, cells: Sequence[Cell], jobs: int) -> None:
-        """Run all cells; on the way out, however that comes, no process is left."""
-        shutil.rmtree(self.cells, ignore_errors=True)  # of a run that was killed
-        self.waiting = iter(cells)
-        try:
-            for _ in range(min(jobs, len(cells))):
-                self._open()
-            while self.slots:
-                self._step()
-                self.book.progress.tick()
-        finally:
-            for slot in self.slots:
-                slot.close()
-            self.selector.close()
-            shutil.rmtree(self.cells, ignore_errors=True)
-
-    def _open(self) -> None:
-        slot = _Slot(self.threads)
-        self.slots.add(slot)
-        self.selector.register(slot.replies, selectors.EVENT_READ, slot)
-        self.selector.register(slot.output, selectors.EVENT_READ, slot)
-
-    def _close(self, slot: _Slot) -> None:
-        self.slots.discard(slot)
-        self.selector.unregister(slot.replies)
-        self.selector.unregister(slot.output)
-        slot.close()
-
-    def _step(self) -> None:
-        """Wait a moment for news, and deal with it."""
-        for slot in {key.data for key, _ in self.selector.select(0.1)}:
-            slot.drain()
-            news = slot.hear()
-            for outcome in news or ():
-                if slot.cell is not None:
-                    self._finish(slot, outcome)
-                self._next(slot)
-            if news is None:
-                self._lost(slot)
-        late = time.monotonic() - self.job["time_limit"] - GRACE
-        for slot in [slot for slot in self.slots if slot.cell is not None and slot.started < late]:
-            self._lost(slot)
-
-    def _next(self, slot: _Slot) -> None:
-        """Give the slot the next cell, or end it."""
-        cell = next(self.waiting, None)
-        if cell is None:
-            self._close(slot)
-            return
-        with disk_said(self.cells):
-            self.cells.mkdir(exist_ok=True)
-            slot.folder = Path(tempfile.mkdtemp(dir=self.cells)).resolve()
-            (slot.folder / "work").mkdir()
-        slot.printed.clear()
-        slot.cell = cell
-        slot.started = time.monotonic()
-        self.book.progress.started(cell)
-        job = {
-            **self.job,
-            "spec": cell.spec,
-            "seed": cell.row.seed,
-            "source_hash": cell.row.source_hash,
-            "surface": str(self.book.store.surface_path(cell.row.surface_hash).resolve()),
-            "map": str(slot.folder / "map.npz"),
-            "work": str(slot.folder / "work"),
-        }
-        with contextlib.suppress(OSError):  # a supervisor that is gone is heard of next
-            slot.jobs.write(json.dumps(job).encode() + b"\n")
-
-    def _lost(self, slot: _Slot) -> None:
-        """Deal with a supervisor that is gone or hangs: its cell ends here, another takes over."""
-        if slot.cell is None:
-            said = last_lines(slot.printed, lines=1)
-            raise RuntimeError(f"benchmarks.worker ended unasked: {said}")
-        limit = self.job["time_limit"]
-        if slot.process.poll() is None and time.monotonic() > slot.started + limit:
-            reason = f"not done within the limit of {limit:g} s, and hard to kill"
-            self._finish(slot, {"status": "timeout", "reason": reason})
-        else:
-            reason = "killed the process that watched over it"
-            self._finish(slot, {"status": "failed", "reason": reason})
-        self._close(slot)
-        self._open()
-
-    def _finish(self, slot: _Slot, outcome: dict[str, Any]) -> None:
-        """Write the row of the slot's cell, its map before."""
-        cell = slot.cell
-        assert cell is not None
-        slot.cell = None
-        if outcome["status"] == "stop":
-            raise InputError(
-                f"{outcome['reason']}; earlier results are intact: mend that and run again"
-            )
-        took = time.monotonic() - slot.started
-        self.book.summary.method_seconds += outcome.get("seconds") or took
-        if outcome["status"] == "ok":
-            self.book.store.add_map(cell.row.id, slot.folder / "map.npz")
-            outcome["uv_file"] = f"uv/{cell.row.id}.npz"
-        else:
-            outcome["output"] = last_lines(slot.printed)
-        self.book.write(cell, outcome)
-        shutil.rmtree(slot.folder, ignore_errors=True)
 
 
 def last_lines(printed: bytes | bytearray, lines: int = 20, characters: int = 4000) -> str:

@@ -1,10 +1,13 @@
 """One cell of a run: a process of its own, under a time limit and a memory limit.
 
-`python -m benchmarks.worker FD` is a supervisor. It has the slow imports behind it, takes cells as
-JSON lines on standard input, runs each in a child process that it watches, and answers with one
-JSON line each on file descriptor FD. On Linux the child is a fork, which costs milliseconds; the
-supervisor only imports and never computes, so that no thread exists which a fork could lose.
-Elsewhere, where forking after such imports is not safe, the child is a fresh interpreter.
+`python -m benchmarks.worker FD` is a supervisor. It has the slow imports behind it, takes jobs
+(cells, and later the metrics of their maps) as JSON lines on standard input, runs each in a child
+process that it watches, and answers with one JSON line each on file descriptor FD.
+
+On Linux the child is a fork, which costs milliseconds. The supervisor only imports and never
+computes: no thread exists that a fork could lose (but OpenBLAS's own, which it stops and restarts
+around a fork). Elsewhere, where forking after such imports is not safe, the child is a fresh
+interpreter.
 
 What a method may do, it does to its own cell: the child has its own session, its own empty working
 folder, and a result pipe that ends with it. At a limit all its descendants are killed, those that
@@ -21,6 +24,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import faulthandler
+import importlib
 import json
 import os
 import random
@@ -40,8 +44,16 @@ import psutil
 import scipy.sparse.linalg  # noqa: F401  as above
 
 from baselines import registry
-from benchmarks.results import arrays_hash, map_arrays, plain, read_surface, trace_arrays
-from benchmarks.results import write_arrays as write_map
+from benchmarks.results import (
+    arrays_hash,
+    map_arrays,
+    measured,
+    plain,
+    read_map,
+    read_surface,
+    trace_arrays,
+    write_arrays,
+)
 from parapoint.method import UnsupportedError, prepared
 from parapoint.parameterization import Parameterization, PointParameterization
 from parapoint.surface import Mesh, Surface
@@ -73,7 +85,10 @@ def main() -> None:
     jobs = os.fdopen(os.dup(0), "rb", buffering=0)
     os.write(reply, b'{"status": "ready"}\n')
     while line := jobs.readline():
-        outcome = _supervised(json.loads(line), wake, [reply, wake, waker, jobs.fileno()])
+        job = json.loads(line)
+        if "measure" in job:
+            importlib.import_module("benchmarks.metrics")  # once, before the forks
+        outcome = _supervised(job, wake, [reply, wake, waker, jobs.fileno()])
         os.write(reply, json.dumps(outcome).encode() + b"\n")
 
 
@@ -173,10 +188,11 @@ def _perform(job: dict[str, Any], send: int) -> Never:
     faulthandler.enable(file=2, all_threads=False)
     os.chdir(job["work"])
     os.environ["TMPDIR"] = job["work"]
-    random.seed(job["seed"])
-    np.random.seed(job["seed"] % 2**32)  # noqa: NPY002  for methods that draw from the global one
+    seed = job.get("seed", 0)
+    random.seed(seed)
+    np.random.seed(seed % 2**32)  # noqa: NPY002  for methods that draw from the global one
     try:
-        outcome = _outcome(job)
+        outcome = _measured(job) if "measure" in job else _outcome(job)
     except BaseException as error:  # noqa: BLE001  whatever a method raises is a row
         traceback.print_exc()
         outcome = _failure(error)
@@ -221,10 +237,16 @@ def _outcome(job: dict[str, Any]) -> Outcome:
     everything = arrays | trace_arrays(result.trace)
     report = plain(result.report)
     try:
-        write_map(Path(job["map"]), everything)
+        write_arrays(Path(job["map"]), everything)
     except OSError as error:  # not the method's fault: the run cannot go on
         return {"status": "stop", "reason": f"{job['map']}: {error.strerror}"}
     return {"status": "ok", "uv_sha256": arrays_hash(arrays), "report": report} | timing
+
+
+def _measured(job: dict[str, Any]) -> Outcome:
+    """Every metric of a stored map, numbers as text: JSON has no infinity."""
+    surface, result = read_surface(Path(job["surface"])), read_map(Path(job["measure"]))
+    return {"status": "ok", "metrics": {k: repr(v) for k, v in measured(surface, result).items()}}
 
 
 def fault(surface: Surface, result: object) -> str:

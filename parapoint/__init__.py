@@ -1,19 +1,20 @@
 """ParaPoint: global, free-boundary UV maps of raw 3D point clouds, and the types around them.
 
-Importing this package does not import torch; `parapoint.ParaPoint` does, at first use.
+Importing this package imports nothing else: what is in it comes with its first use, so that
+commands answer at once and torch is loaded only where it computes.
 """
 
 from __future__ import annotations
 
+import importlib
 from typing import TYPE_CHECKING
 
-from parapoint.errors import InputError
-from parapoint.method import Method
-from parapoint.parameterization import Parameterization, PointParameterization
-from parapoint.surface import Mesh, PointCloud
-
 if TYPE_CHECKING:
+    from parapoint.errors import InputError
     from parapoint.estimator import ParaPoint
+    from parapoint.method import Method
+    from parapoint.parameterization import Parameterization, PointParameterization
+    from parapoint.surface import Mesh, PointCloud
 
 __version__ = "0.1.0"
 __all__ = [
@@ -26,10 +27,18 @@ __all__ = [
     "PointParameterization",
 ]
 
+_MODULES = {
+    "InputError": "errors",
+    "Mesh": "surface",
+    "Method": "method",
+    "ParaPoint": "estimator",
+    "Parameterization": "parameterization",
+    "PointCloud": "surface",
+    "PointParameterization": "parameterization",
+}
+
 
 def __getattr__(name: str) -> object:
-    if name == "ParaPoint":
-        from parapoint.estimator import ParaPoint
-
-        return ParaPoint
-    raise AttributeError(f"module 'parapoint' has no attribute {name!r}")
+    if name not in _MODULES:
+        raise AttributeError(f"module 'parapoint' has no attribute {name!r}")
+    return getattr(importlib.import_module(f"parapoint.{_MODULES[name]}"), name)

@@ -1,0 +1,207 @@
+"""`python -m benchmarks`: the contract of the commands."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from benchmarks import __main__ as commands
+from benchmarks import models, runner, suites
+from benchmarks.results import Store, map_arrays, write_arrays
+from parapoint import console
+from parapoint.errors import InputError
+
+PLUGIN = """
+from dataclasses import dataclass
+from typing import ClassVar
+from parapoint import Parameterization
+
+@dataclass(frozen=True)
+class {name}:
+    requires: ClassVar[frozenset[str]] = frozenset({{"faces"}})
+    height: float = 0.0
+    def parameterize(self, surface, *, seed):
+        if self.height:
+            raise ValueError("too high")
+        return Parameterization(surface.vertices[:, :2], surface.faces)
+"""
+
+
+def command(*arguments: str) -> int:
+    """The exit status of a command, run in this process."""
+    with pytest.raises(SystemExit) as exit_info:
+        console.run(commands.main, list(arguments))
+    return int(exit_info.value.code or 0)
+
+
+@pytest.fixture
+def plugin(tmp_path, request):
+    """A plugin file whose class has a name of its own: plugins stay for the process."""
+    name = "P" + "".join(filter(str.isalnum, request.node.name)).lower()
+    (tmp_path / "plugin.py").write_text(PLUGIN.format(name=name))
+    return f"{tmp_path}/plugin.py:{name}", name.lower()
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("a", ["a"]),
+        ("a, b", ["a", "b"]),
+        (
+            "slim(energy=conformal, iterations=1),lscm",
+            ["slim(energy=conformal, iterations=1)", "lscm"],
+        ),
+        ("m(a=(1, 2), b=[3, 4]),n(c='),,(')", ["m(a=(1, 2), b=[3, 4])", "n(c='),,(')"]),
+    ],
+)
+def test_a_list_is_split_outside_of_brackets_and_quotes(text, parts):
+    assert commands.split(text) == parts
+
+
+@pytest.mark.parametrize("text", ["", "a,,b", "a,", "m(a=1", "m(a='1)"])
+def test_a_malformed_list_is_an_input_error(text):
+    with pytest.raises(InputError):
+        commands.split(text)
+
+
+def test_help_is_light():
+    code = (
+        "import sys; from benchmarks import __main__ as m\n"
+        "try: m.main(['run', '--help'])\n"
+        "except SystemExit: pass\n"
+        "print('loaded', {'torch', 'scipy', 'igl', 'pandas', 'numpy'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "--methods" in done.stdout
+    assert done.stdout.endswith("loaded set()\n")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["nonsense"],
+        ["run", "nonsense"],
+        ["run", "--methods", "nonsense"],
+        ["run", "--methods", "slim(iterations=many)"],
+        ["run", "--methods", "slim("],
+        ["run", "--cases", "nonsense"],
+        ["run", "--cases", "missing.obj"],
+        ["run", "--seeds", "one"],
+        ["run", "--seeds", "-1"],
+        ["run", "--jobs", "0"],
+        ["run", "--timeout", "0"],
+        ["run", "--memory", "x"],
+        ["run", "--plugin", "missing.py:Class"],
+        ["run", "--nonsense"],
+        ["list", "nonsense"],
+        ["check", "missing"],
+        ["score", "missing.obj"],
+    ],
+)
+def test_wrong_use_is_one_line_and_status_2_and_nothing_written(
+    arguments, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    assert command(*arguments) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert shown.err.startswith("error: ")
+    assert shown.err.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_run_goes_from_a_file_and_a_plugin_to_a_checked_folder(
+    tmp_path, monkeypatch, capsys, plugin
+):
+    monkeypatch.chdir(tmp_path)
+    location, name = plugin
+    (tmp_path / "mesh.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    specs = f"tutte,{name}(height=1.0)"
+    arguments = ["run", "--cases", "mesh.off", "--methods", specs, "--plugin", location]
+    assert command(*arguments) == 0
+    shown = capsys.readouterr()
+    assert "custom: 2 cells to run (2 new)" in shown.out
+    assert f"mesh.off, {name}(height=1.0): failed: ValueError: too high" in shown.out
+    assert shown.err == ""
+    rows = {row.method: row for row in Store("results").rows()}
+    assert rows["tutte"].case == "mesh.off"
+    assert rows["tutte"].suite == "custom"
+    assert rows[name].params == {"height": 1.0}
+    assert (tmp_path / "results" / "metrics.parquet").is_file()
+
+    assert command(*arguments, "--strict") == 1
+    assert "custom: 0 cells to run; 2 are done already" in capsys.readouterr().out
+
+    assert command("check", "results") == 0
+    assert "2 cells, 1 maps: no faults" in capsys.readouterr().out
+    store = Store("results")
+    result = store.result(rows["tutte"])
+    changed = map_arrays(result) | {"uv": np.asarray(result.uv) * 2}
+    write_arrays(store.uv_path(rows["tutte"].id), changed)
+    assert command("check", "results") == 1
+    assert "is not the map that was written" in capsys.readouterr().out
+
+
+def test_a_plugin_joins_the_methods_of_the_suite(monkeypatch, tmp_path, plugin):
+    location, name = plugin
+    calls = []
+
+    def noted(suite, chosen, *_, **__):
+        calls.append((suite.cases, [method.spec for method in chosen]))
+        return iter(())
+
+    monkeypatch.setattr(runner, "_todo", noted)
+    monkeypatch.setattr(runner, "_measure", lambda *_: None)
+    out = ["--out", str(tmp_path / "out")]
+    assert command("run", "builtin", "--plugin", location, "--cases", "cone", *out) == 0
+    assert (
+        command("run", "builtin", "--plugin", location, "--cases", "cone", "--methods", name, *out)
+        == 0
+    )
+    assert calls == [
+        (("cone",), [*suites.suite("builtin").methods, name]),
+        (("cone",), [name]),
+    ]
+
+
+def test_the_built_in_surfaces_stand_in_where_no_model_can_be_had(tmp_path, monkeypatch, capsys):
+    def nothing(case):
+        if case in suites.suite("paper").cases:
+            raise models.MissingModelError(f"{case} is not at hand: download it")
+        return load(case)
+
+    load = models.load
+    monkeypatch.setattr(models, "load", nothing)
+    out = tmp_path / "out"
+    assert command("run", "paper", "--methods", "tutte", "--out", str(out)) == 0
+    shown = capsys.readouterr().out
+    for case in suites.suite("paper").cases:
+        assert f"{case} is left out: {case} is not at hand: download it" in shown
+    heading = shown.index("The built-in surfaces run in their place")
+    assert shown.index("is left out") < heading < shown.index("builtin: Surfaces made in memory")
+    rows = Store(out).rows()
+    assert {row.status for row in rows if row.suite == "paper"} == {"skipped"}
+    assert {row.case for row in rows if row.suite == "builtin"} == set(
+        suites.suite("builtin").cases
+    )
+
+
+@pytest.mark.parametrize("what", ["suites", "cases", "methods", "metrics"])
+def test_lists_are_tables_of_tab_separated_lines_in_a_pipe(what, capsys):
+    assert command("list", what) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) > 5
+    assert len({line.count("\t") for line in lines}) == 1
+    first = {"suites": "smoke", "cases": "beetle_bff", "methods": "tutte"}
+    assert first.get(what, "angle_difference_mean") in {line.split("\t")[0] for line in lines}
+
+
+def test_score_prints_json_and_nothing_else(tmp_path, capsys):
+    lines = ["v 0 0 0", "v 1 0 0", "v 0 1 0", "vt 0 0", "vt 1 0", "vt 0 1", "f 1/1 2/2 3/3"]
+    (tmp_path / "map.obj").write_text("\n".join(lines) + "\n")
+    assert command("score", str(tmp_path / "map.obj"), "--json") == 0
+    assert json.loads(capsys.readouterr().out)["angle_difference_mean"] == pytest.approx(0)

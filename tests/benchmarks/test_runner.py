@@ -1,0 +1,413 @@
+"""Cells are isolated, limited and resumed; whatever a method does is a row."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+from benchmarks import models, runner
+from benchmarks.results import ResultRow, Store
+from benchmarks.runner import Summary, run
+from benchmarks.suites import Suite
+from parapoint.errors import InputError
+
+METHOD = """
+import ctypes, os, signal, subprocess, sys, time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+from parapoint import Parameterization
+from parapoint.method import UnsupportedError
+
+FACES = frozenset({"faces"})
+
+
+def flat(surface):
+    report = {"energy": np.float64(2)}
+    return Parameterization(surface.vertices[:, :2], surface.faces, report=report)
+"""
+FAULTS = {
+    "segfault": "ctypes.string_at(0)",
+    "quitter": "os._exit(0)",
+    "exiter": "sys.exit('enough')",
+    "suicide": "os.kill(os.getpid(), signal.SIGKILL)",
+    "patricide": "os.kill(os.getppid(), signal.SIGKILL); time.sleep(60)",
+    "eater": """
+        hoard = []
+        while True:
+            hoard.append(np.ones(1 << 20))
+            time.sleep(0.002)
+        """,
+    "refused": "raise MemoryError",
+    "sleeper": """
+        for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+            signal.signal(number, signal.SIG_IGN)
+        print("going to sleep")
+        while True:
+            time.sleep(60)
+        """,
+    "forker": """
+        for _ in range(2):  # a daemon: its own session, its parent gone
+            if os.fork():
+                return flat(surface)
+            os.setsid()
+        Path(os.environ["NOTES"], "daemon").write_text(str(os.getpid()))
+        time.sleep(60)
+        """,
+    "printer": """
+        for _ in range(20000):
+            print("x" * 1000)
+        print("the last words")
+        raise ValueError("two\\nlines")
+        """,
+    "blank": "return Parameterization(surface.vertices[:, :2] * np.nan, surface.faces)",
+    "short": "return Parameterization(surface.vertices[:, :2], surface.faces[1:])",
+    "untyped": "return surface.vertices[:, :2]",
+    "picky": "raise UnsupportedError('not on a Sunday')",
+    "writer": """
+        Path("litter").write_text("litter")
+        Path(os.environ["NOTES"], "cwd").write_text(os.getcwd())
+        return flat(surface)
+        """,
+    "verbose": """
+        return Parameterization(surface.vertices[:, :2], surface.faces, report={"x": "y" * 2**21})
+        """,
+    "random": """
+        uv = np.random.random((len(surface.vertices), 2))  # unseeded, all the same
+        return Parameterization(uv, surface.faces)
+        """,
+}
+CASE = "half_cylinder"
+LIMITS = {"timeout": 3.0, "memory": 0.4}
+
+
+def write_plugin(path: Path, bodies: dict[str, str]) -> list[str]:
+    """Writes a file of methods; the plugins in it, named as the keys."""
+    text = METHOD
+    for name, body in bodies.items():
+        lines = textwrap.indent(textwrap.dedent(body), " " * 8)
+        text += (
+            f"\n@dataclass(frozen=True)\nclass {name.title()}:\n"
+            f"    requires: ClassVar[frozenset[str]] = FACES\n"
+            f"    step: int = 1\n"
+            f"    def parameterize(self, surface, *, seed):\n{lines}\n"
+        )
+    path.write_text(text)
+    return [f"{path}:{name.title()}" for name in bodies]
+
+
+def suite(*methods: str, seeds: tuple[int, ...] = (0,)) -> Suite:
+    return Suite("trial", "A trial", (CASE,), methods, seeds)
+
+
+@pytest.fixture(scope="module")
+def notes(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("notes")
+
+
+@pytest.fixture(scope="module")
+def faulty(tmp_path_factory: pytest.TempPathFactory, notes: Path) -> tuple[Summary, Store]:
+    """One run of all that a method can do wrong."""
+    folder = tmp_path_factory.mktemp("faulty")
+    os.environ["NOTES"] = str(notes)
+    plugins = write_plugin(folder / "faults.py", FAULTS)
+    summary = run(
+        suite(), folder / "out", plugins=plugins, methods=[*FAULTS, "tutte"], jobs=2, **LIMITS
+    )
+    return summary, Store(folder / "out")
+
+
+@pytest.fixture
+def unmeasured(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Saves the second that the metrics take where they are beside the point."""
+    monkeypatch.setattr(runner, "_measure", lambda *_: None)
+
+
+def row_of(faulty: tuple[Summary, Store], method: str) -> ResultRow:
+    return next(row for row in faulty[1].rows() if row.method == method)
+
+
+@pytest.mark.parametrize(
+    ("method", "status", "reason"),
+    [
+        ("segfault", "failed", "killed by SIGSEGV (segmentation fault)"),
+        ("quitter", "failed", "ended the process (exit status 0) with no result"),
+        ("exiter", "failed", "SystemExit: enough"),
+        ("suicide", "failed", "killed by SIGKILL (killed)"),
+        ("patricide", "failed", "killed the process that watched over it"),
+        ("refused", "out_of_memory", "MemoryError"),
+        ("sleeper", "timeout", "not done within the limit of 3 s"),
+        ("printer", "failed", "ValueError: two lines"),
+        ("short", "failed", "returned 1151 corner rows for 1152 faces"),
+        ("untyped", "failed", "returned ndarray for a mesh; it must be a Parameterization"),
+        ("picky", "skipped", "not on a Sunday"),
+    ],
+)
+def test_a_fault_is_a_row_with_its_reason(faulty, method, status, reason):
+    row = row_of(faulty, method)
+    assert (row.status, row.reason) == (status, reason)
+    assert row.uv_file == row.uv_sha256 == ""
+
+
+def test_nan_names_the_first_bad_row(faulty):
+    assert row_of(faulty, "blank").reason.startswith("InputError: uv must be finite; row 0")
+
+
+def test_the_memory_limit_holds(faulty):
+    row = row_of(faulty, "eater")
+    assert row.status == "out_of_memory"
+    assert row.reason.endswith("MB of memory; the limit is 400 MB")
+    assert 400 < row.peak_memory_mb < 1500
+
+
+def test_a_large_report_costs_the_cell_only(faulty):
+    row = row_of(faulty, "verbose")
+    assert row.status == "failed"
+    assert "report is too large" in row.reason
+
+
+def test_all_other_cells_are_untouched(faulty):
+    summary, store = faulty
+    assert len(store.rows()) == len(FAULTS) + 1
+    assert row_of(faulty, "tutte").status == "ok"
+    assert row_of(faulty, "random").status == "ok"
+    assert not list(store.faults())
+    assert {row.id for row in summary.ran} == {row.id for row in store.rows()}
+
+
+def test_the_last_lines_printed_are_kept_and_no_more(faulty):
+    printed = row_of(faulty, "printer").output
+    assert "the last words" in printed
+    assert len(printed) <= 4000
+    assert "going to sleep" in row_of(faulty, "sleeper").output
+    assert "Segmentation fault" in row_of(faulty, "segfault").output
+
+
+def test_no_process_outlives_its_cell(faulty, notes):
+    assert row_of(faulty, "forker").status == "ok"
+    assert not psutil.pid_exists(int((notes / "daemon").read_text()))
+    assert not psutil.Process().children(recursive=True)
+
+
+def test_a_method_writes_into_a_folder_that_goes_away(faulty, notes):
+    assert row_of(faulty, "writer").status == "ok"
+    assert not Path((notes / "cwd").read_text()).exists()
+    assert not (faulty[1].folder / "cells").exists()
+    assert not Path("litter").exists()
+
+
+def test_every_cell_has_its_resources_and_an_ok_one_its_map(faulty):
+    row, store = row_of(faulty, "forker"), faulty[1]
+    assert row.report == {"energy": 2.0}
+    assert row.params == {"step": 1}
+    assert 0 <= row.seconds < 5
+    assert 0 <= row.cpu_seconds < 5
+    assert 20 < row.peak_memory_mb < 400
+    surface, result = store.surface(row), store.result(row)
+    assert (result.uv == surface.vertices[:, :2]).all()
+    assert (result.corners == surface.faces).all()
+
+
+def test_the_environment_of_a_run_is_written(faulty):
+    (entry,) = faulty[1].environment()["runs"]
+    assert {"commit", "python", "packages", "cpu", "threads", "date"} <= entry.keys()
+    assert (entry["jobs"], entry["time_limit"], entry["memory_limit"]) == (2, 3.0, 4e8)
+
+
+def test_metrics_of_all_cells_are_there_after_a_run(faulty):
+    frame = faulty[1].metrics()
+    assert list(frame.columns[:6]) == ["suite", "case", "method", "params", "seed", "status"]
+    assert len(frame) == len(FAULTS) + 1
+    values = frame.set_index("method")["angle_difference_mean"]
+    assert values.notna().to_dict() == {row.method: row.status == "ok" for row in faulty[1].rows()}
+
+
+@pytest.mark.usefixtures("unmeasured")
+def test_a_method_that_needs_a_disk_is_skipped_on_a_sphere(tmp_path):
+    plugins = write_plugin(tmp_path / "plugin.py", {"strict": "return flat(surface)"})
+    text = (tmp_path / "plugin.py").read_text()
+    (tmp_path / "plugin.py").write_text(text.replace('{"faces"}', '{"disk"}'))
+    summary = run(suite(), tmp_path / "out", plugins=plugins, methods=["strict"], cases=["sphere"])
+    (row,) = summary.ran
+    assert (row.status, row.reason) == ("skipped", "needs a disk; the surface is sphere")
+
+
+@pytest.mark.usefixtures("unmeasured")
+def test_the_same_cell_gives_the_same_map(tmp_path, faulty):
+    # The plugin is known to this process, not to the new run's workers.
+    plugins = [f"{faulty[1].folder.parent}/faults.py:Random"]
+    again = run(suite(), tmp_path, plugins=plugins, methods=["random", "tutte"], seeds=[0, 1])
+    hashes = {(row.method, row.seed): row.uv_sha256 for row in again.ran}
+    assert hashes["tutte", 0] == row_of(faulty, "tutte").uv_sha256
+    assert hashes["random", 0] == row_of(faulty, "random").uv_sha256
+    assert hashes["random", 0] != hashes["random", 1]
+
+
+@pytest.mark.usefixtures("unmeasured")
+def test_only_what_is_missing_or_changed_runs_again(tmp_path):
+    out = tmp_path / "out"
+    mesh = tmp_path / "mesh.off"
+    mesh.write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    bodies = {"one": "return flat(surface)", "two": "return flat(surface)"}
+    (one,) = write_plugin(tmp_path / "first.py", {"one": bodies["one"]})
+    (two,) = write_plugin(tmp_path / "second.py", {"two": bodies["two"]})
+
+    def reasons(**options) -> dict[str, int]:
+        options = {"plugins": [one, two], "methods": ["one", "two"], "cases": [str(mesh)]} | options
+        return dict(run(suite(), out, **options).reasons)
+
+    assert reasons() == {"new": 2}
+    before = {row.id for row in Store(out).rows()}
+    assert reasons() == {}
+    assert reasons(methods=["one", "two(step=2)"]) == {"new": 1}
+    with (tmp_path / "second.py").open("a") as stream:
+        stream.write("\n# a change\n")
+    assert reasons() == {"method changed": 1}
+    mesh.write_text("OFF\n3 1 0\n0 0 0\n2 0 0\n0 1 0\n3 0 1 2\n")
+    assert reasons() == {"model changed": 2}
+    assert not before & {row.id for row in Store(out).rows()}
+    assert before <= {row.id for row in Store(out).history()}
+    assert len(Store(out).rows()) == 3
+    next((out / "uv").glob(Store(out).rows()[0].id + "*")).unlink()
+    assert reasons() == {"map missing": 1}
+
+
+@pytest.mark.usefixtures("unmeasured")
+def test_a_timeout_runs_again_only_under_a_higher_limit(tmp_path):
+    plugins = write_plugin(tmp_path / "plugin.py", {"slow": "time.sleep(1); return flat(surface)"})
+    options = {"plugins": plugins, "methods": ["slow"]}
+    statuses = [
+        [row.status for row in run(suite(), tmp_path / "out", timeout=limit, **options).ran]
+        for limit in (0.3, 0.3, 30)
+    ]
+    assert statuses == [["timeout"], [], ["ok"]]
+
+
+@pytest.mark.usefixtures("unmeasured")
+def test_a_missing_model_is_a_skipped_row_and_the_rest_runs(tmp_path, monkeypatch):
+    load = models.load
+
+    def without_sphere(case: str):
+        if case == "sphere":
+            raise models.MissingModelError("sphere is not at hand: draw one")
+        return load(case)
+
+    both = Suite("trial", "A trial", (CASE, "sphere"), ("tutte",), (0,))
+    with monkeypatch.context() as patch:
+        patch.setattr(models, "load", without_sphere)
+        summary = run(both, tmp_path)
+        assert summary.missing == {"sphere": "sphere is not at hand: draw one"}
+        assert {row.case: row.status for row in summary.ran} == {CASE: "ok", "sphere": "skipped"}
+        assert run(both, tmp_path).ran == []
+        with pytest.raises(models.MissingModelError):
+            run(both, tmp_path / "asked", cases=["sphere"])
+        assert not (tmp_path / "asked").exists()
+    assert dict(run(both, tmp_path).reasons) == {"model was missing": 1}
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"methods": ["nonsense"]},
+        {"methods": ["slim(nonsense=1)"]},
+        {"cases": ["nonsense"]},
+        {"cases": ["missing.obj"]},
+        {"plugins": ["missing.py:Class"]},
+    ],
+)
+def test_an_unknown_name_is_an_input_error_and_nothing_is_written(tmp_path, options):
+    with pytest.raises(InputError):
+        run(suite("tutte"), tmp_path / "out", **options)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_malformed_file_stops_the_run_before_it_begins(tmp_path):
+    (tmp_path / "bad.off").write_text("OFF\n1 1 0\n0 0 nan\n3 0 0 9\n")
+    with pytest.raises(InputError, match=r"bad\.off"):
+        run(suite("tutte"), tmp_path / "out", cases=[CASE, str(tmp_path / "bad.off")])
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.usefixtures("unmeasured")
+def test_a_disk_that_fills_up_ends_the_run_and_keeps_what_is_there(tmp_path, monkeypatch):
+    run(suite("tutte"), tmp_path)
+    before = (tmp_path / "runs.jsonl").read_bytes()
+    real = os.write
+
+    def full(descriptor: int, content: bytes) -> int:
+        return real(descriptor, content[:10] if content.startswith(b'{"id"') else content)
+
+    monkeypatch.setattr(os, "write", full)
+    with pytest.raises(InputError, match=r"no space left .* earlier results are intact"):
+        run(suite("lscm"), tmp_path)
+    monkeypatch.undo()
+    assert (tmp_path / "runs.jsonl").read_bytes() == before
+    assert [row.status for row in run(suite("lscm"), tmp_path).ran] == ["ok"]
+
+
+@pytest.mark.usefixtures("unmeasured")
+def test_a_killed_run_loses_only_the_cell_in_flight(tmp_path):
+    body = f"""
+        Path({str(tmp_path)!r}, str(seed)).write_text(str(os.getpid()))
+        time.sleep(0.3 if seed < 2 else 60)
+        return flat(surface)
+        """
+    (plugin,) = write_plugin(tmp_path / "plugin.py", {"late": body})
+    command = ["-m", "benchmarks", "run", "--cases", CASE, "--methods", "late", "--seeds", "0,1,2"]
+    process = subprocess.Popen(
+        [sys.executable, *command, "--plugin", plugin, "--out", tmp_path / "out"],
+        cwd=runner.environment.ROOT,
+        stdout=subprocess.DEVNULL,
+    )
+    wait_until(lambda: (tmp_path / "2").is_file() and (tmp_path / "2").read_text())
+    with pytest.raises(InputError, match="in use by another run"):
+        run(suite("tutte"), tmp_path / "out")
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    cell = int((tmp_path / "2").read_text())
+    wait_until(lambda: not psutil.pid_exists(cell))
+    with (tmp_path / "out" / "runs.jsonl").open("a") as stream:
+        stream.write('{"id": "a torn li')
+    done = Store(tmp_path / "out").rows()
+    assert [(row.seed, row.status) for row in done] == [(0, "ok"), (1, "ok")]
+    custom = Suite("custom", "Again", (CASE,), ("late",), (0, 1, 2))
+    summary = run(custom, tmp_path / "out", plugins=[plugin], timeout=0.5)
+    assert [(row.seed, row.status) for row in summary.ran] == [(2, "timeout")]
+    assert summary.kept == done
+    assert not list(Store(tmp_path / "out").faults())
+    assert "a torn li" in (tmp_path / "out" / "runs.torn").read_text()
+    assert len(Store(tmp_path / "out").environment()["runs"]) == 2
+
+
+def wait_until(condition, seconds: float = 30) -> None:
+    """Waits for a condition to hold."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.02)
+
+
+def test_a_wild_map_has_no_metrics_but_its_run_ends(tmp_path, monkeypatch):
+    body = """
+        uv = np.random.default_rng(seed).random((len(surface.vertices), 2))
+        return Parameterization(uv * 1e300, surface.faces)
+        """
+    plugins = write_plugin(tmp_path / "plugin.py", {"wild": body})
+    monkeypatch.setattr(runner, "METRICS_TIME_LIMIT", 0.01)
+    summary = run(suite(), tmp_path / "out", plugins=plugins, methods=["wild"])
+    (row,) = summary.ran
+    assert row.status == "ok"
+    assert row.id in summary.unmeasured
+    assert Store(tmp_path / "out").metrics()["angle_difference_mean"].isna().all()
+    assert json.loads((tmp_path / "out" / "runs.jsonl").read_text())["status"] == "ok"
