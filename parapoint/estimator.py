@@ -28,7 +28,7 @@ from parapoint.networks import ACTIVATIONS, Networks
 from parapoint.parameterization import Parameterization, PointParameterization, TracePoint
 from parapoint.presets import PRESETS, Preset
 from parapoint.surface import BoolArray, FloatArray, Mesh, PointCloud, Surface
-from parapoint.trainer import Step, Trainer, surface_sample
+from parapoint.trainer import PRECISIONS, Step, Trainer, surface_sample
 
 logger = logging.getLogger("parapoint")
 
@@ -84,6 +84,8 @@ class ParaPoint:
         distortion: "conformal" or "isometric".
         distortion_weight: its weight; the paper's text has 1e-4 for complex shapes.
         eigenvalues: "singular" or "gram", the readings of "the eigenvalues of the Jacobian".
+        warm_up: share of the run that goes to the convex hull.
+        precision: "float32" or "bfloat16" (see `Preset`).
         branches: "both", or an ablation: "3d" (3D→2D→3D alone) or "2d" (2D→3D→2D alone).
         seed: of every random draw.
         device: "auto", "cpu" or "cuda".
@@ -104,6 +106,8 @@ class ParaPoint:
     time_budget: float | None = None
     subset: int | None = None
     all_from: float | None = None
+    warm_up: float | None = None
+    precision: str | None = None
     distortion: str | None = None
     distortion_weight: float | None = None
     eigenvalues: str | None = None
@@ -329,6 +333,7 @@ class ParaPoint:
             "points_of_a_step": min(preset.subset, len(self.points_)),
             "iterations": trainer.iteration,
             "warm_up": preset.warm_up,
+            "precision": trainer.precision,
             "weights": trainer.weights,
             "distortion": preset.distortion,
             "eigenvalues": preset.eigenvalues,
@@ -360,6 +365,7 @@ class ParaPoint:
         for name, choices in (
             ("distortion", DISTORTIONS),
             ("eigenvalues", EIGENVALUES),
+            ("precision", PRECISIONS),
             ("branches", ("both", "3d", "2d")),
         ):
             value = getattr(self, name)
@@ -367,8 +373,10 @@ class ParaPoint:
                 raise InputError(f"{name} must be one of {', '.join(choices)}, not {value!r}")
         if self.time_budget is not None and not 0 < self.time_budget < math.inf:
             raise InputError(f"time_budget must be a number of seconds, not {self.time_budget}")
-        if self.all_from is not None and not 0 <= self.all_from <= 1:
-            raise InputError(f"all_from must lie between 0 and 1, not {self.all_from}")
+        for name in ("all_from", "warm_up"):
+            value = getattr(self, name)
+            if value is not None and not 0 <= value <= 1:
+                raise InputError(f"{name} must lie between 0 and 1, not {value}")
         weight = self.distortion_weight
         if weight is not None and not 0 <= weight < math.inf:
             raise InputError(f"distortion_weight must be a number of at least 0, not {weight}")

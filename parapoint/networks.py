@@ -72,20 +72,29 @@ ACTIVATIONS: dict[str, Activation] = {"leaky_relu": LeakyReLU(), "softplus": Sof
 """What `Preset.activation` may name."""
 
 
+NARROW = 32
+"""Layers with fewer inputs or outputs hold coordinates: float32 whatever the precision."""
+
+
 class _StackFunction(torch.autograd.Function):
-    """A stack of linear layers with its backward pass written out: elementwise work in place."""
+    """A stack of linear layers with its backward pass written out: elementwise work in place.
+
+    The products of wide layers, and what they take and give, are in the precision asked for.
+    """
 
     @staticmethod
-    def forward(ctx: Any, x: Tensor, activation: Activation, *parameters: Tensor) -> Tensor:
-        weights, biases = parameters[::2], parameters[1::2]
+    def forward(
+        ctx: Any, x: Tensor, activation: Activation, precision: torch.dtype, *parameters: Tensor
+    ) -> Tensor:
+        weights = [w.to(precision) if min(w.shape) >= NARROW else w for w in parameters[::2]]
         inputs: list[Tensor] = []
         z = x.contiguous()
-        for weight, bias in zip(weights, biases, strict=True):
+        for weight, bias in zip(weights, parameters[1::2], strict=True):
             if inputs:
                 activation.push_(z)
-            inputs.append(z)
-            z = z @ weight.t()
-            z[0] += bias
+            inputs.append(z.to(weight.dtype))
+            z = inputs[-1] @ weight.t()
+            z[0] += bias.to(z.dtype)
         ctx.activation = activation
         ctx.save_for_backward(*weights, *inputs)
         return z
@@ -98,14 +107,19 @@ class _StackFunction(torch.autograd.Function):
         of_parameters: list[Tensor] = []
         gradient = output_gradient.contiguous()
         for weight, h in zip(reversed(weights), reversed(inputs), strict=True):
-            of_parameters += [gradient[0].sum(0), gradient.flatten(0, 1).t() @ h.flatten(0, 1)]
+            gradient = gradient.to(weight.dtype)
+            of_weight = gradient.flatten(0, 1).t() @ h.flatten(0, 1)
+            of_parameters += [
+                gradient[0].sum(0).to(output_gradient.dtype),
+                of_weight.to(output_gradient.dtype),
+            ]
             is_first = len(of_parameters) == 2 * layers
             if is_first and not ctx.needs_input_grad[0]:
-                return None, None, *reversed(of_parameters)
+                return None, None, None, *reversed(of_parameters)
             gradient = gradient @ weight
             if not is_first:
                 ctx.activation.pull_(gradient, h)
-        return gradient, None, *reversed(of_parameters)
+        return gradient, None, None, *reversed(of_parameters)
 
 
 class Stack(nn.Module):
@@ -129,10 +143,15 @@ class Stack(nn.Module):
                 uniform = 2 * torch.rand(shape, generator=generator) - 1
                 self.layers.append(nn.Parameter(uniform / before**0.5))
         self.activation = activation
+        self.precision = torch.float32
 
     def forward(self, x: Tensor) -> Tensor:
-        """(1 + T, N, inputs) points and tangents → (1 + T, N, outputs)."""
-        output: Tensor = _StackFunction.apply(x, self.activation, *self.layers)  # type: ignore[no-untyped-call]
+        """(1 + T, N, inputs) points and tangents → (1 + T, N, outputs).
+
+        `precision` holds in training; without gradients all is float32.
+        """
+        precision = self.precision if torch.is_grad_enabled() else torch.float32
+        output: Tensor = _StackFunction.apply(x, self.activation, precision, *self.layers)  # type: ignore[no-untyped-call]
         return output
 
 
@@ -220,6 +239,12 @@ class Networks(nn.Module):
         self.stitch = Stack(3, 3, hidden, activation, generator)
         self.wrap = Stack(2, 3, hidden, activation, generator)
         self.unwrap = Stack(3, 2, hidden, activation, generator)
+
+    def train_in(self, precision: torch.dtype) -> None:
+        """Take the products of wide layers in this precision where gradients are asked for."""
+        for module in self.modules():
+            if isinstance(module, Stack):
+                module.precision = precision
 
     def forward(self, points: Tensor | None, grid: Tensor | None) -> Cycle:
         """Both branches at points P (N, 3) and lattice G (M, 2); None leaves a branch out.

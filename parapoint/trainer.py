@@ -20,6 +20,8 @@ from parapoint.surface import FloatArray
 
 SNAPSHOTS = 100
 """States kept in a run, evenly: the last good one is where a diverged run begins again."""
+PRECISIONS = {"float32": torch.float32, "bfloat16": torch.bfloat16}
+"""What `Preset.precision` may name."""
 DIVERGED = 10.0
 """A mean loss this many times the phase's lowest has diverged."""
 SMALLER_STEP = 0.3
@@ -150,6 +152,8 @@ class Trainer:
             ACTIVATIONS[preset.activation],
             self.generator,
         ).to(device)
+        self.precision = usable_precision(preset.precision, device)
+        self.networks.train_in(PRECISIONS[self.precision])
         self.optimizer = AdamW(list(self.networks.parameters()), preset.weight_decay)
         self.shape = torch.as_tensor(points, dtype=torch.float32)
         self.hull = torch.as_tensor(hull_sample(points, len(points), seed), dtype=torch.float32)
@@ -326,6 +330,15 @@ def objective_terms(preset: Preset, cycle: Cycle, points: Tensor) -> dict[str, T
 
 def _sum(terms: list[Tensor]) -> Tensor:
     return torch.stack(terms).sum()
+
+
+def usable_precision(wanted: str, device: str) -> str:
+    """The precision wanted, or "float32" where the device has no units for it."""
+    if device == "cuda":
+        is_fast = torch.cuda.is_bf16_supported()
+    else:
+        is_fast = torch.cpu._is_amx_tile_supported()  # noqa: SLF001 (there is no public name)
+    return wanted if is_fast else "float32"
 
 
 def lattice(side: int, generator: torch.Generator) -> Tensor:
