@@ -180,11 +180,24 @@ def score(ctx: click.Context, arguments: tuple[str, ...]) -> None:
 
 
 @main.command()
-def speed() -> None:
-    """How much of the machine's rate the heavy parts reach, measured in this run."""
+@click.option(
+    "--figure",
+    type=click.Path(path_type=Path),
+    metavar="OUT.png",
+    help="Draw how the metrics' time and memory grow with the faces.",
+)
+def speed(figure: Path | None) -> None:
+    """How fast the heavy parts are, measured in this run: the metrics, and ParaPoint's training."""
     from benchmarks.display import print_table
+    from benchmarks.metric_speed import growth_figure, metric_costs, metric_table
     from benchmarks.speed import training_table
 
+    if figure is not None and figure.suffix.lower() != ".png":
+        raise InputError(f"{figure}: the figure is a PNG; give a name that ends in .png")
+    costs = metric_costs()
+    print_table(metric_table(costs))
+    if figure is not None:
+        growth_figure(costs, figure)
     print_table(training_table())
 
 
