@@ -153,3 +153,18 @@ def anti_flip_loss(points: Tensor, tangents: Tensor, neighbour_count: int, angle
     near = normals[neighbours(points, neighbour_count)]
     cosine = (normals[:, None] * near).sum(2)
     return (math.cos(angle) - cosine).clamp(min=0).sum(1).mean()
+
+
+def unfolding_loss(unfolding: Tensor) -> Tensor:
+    """Angle distortion of Unwrap∘Cut on the surface itself; not in the paper.
+
+    Mean of (λ1 − λ2)² / (λ1² + λ2²) = (E + G − 2 det) / (E + G), in [0, 2]: 0 where conformal, 1
+    on a collapsed line, above 1 where det < 0, which is a fold.
+
+    Args:
+        unfolding: (2, N, 2) images of two tangent vectors, orthonormal and right-handed around the
+            surface's oriented normal.
+    """
+    (a, b), (c, d) = unfolding[0].unbind(1), unfolding[1].unbind(1)
+    stretch = a * a + b * b + c * c + d * d
+    return ((stretch - 2 * (a * d - b * c)) / (stretch + EPSILON)).mean()

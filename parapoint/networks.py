@@ -186,6 +186,8 @@ class PointBranch(NamedTuple):
         cut_cycle: Wrap(Q) (N, 3).
         points_cycle: Stitch(Wrap(Q)) = f(Q) (N, 3).
         tangents: f_u and f_v at Q (2, N, 3).
+        unfolding: images in the plane of two tangent vectors of the surface at P (2, N, 2), or
+            (0, N, 2) where none were given.
     """
 
     points: Tensor
@@ -194,6 +196,7 @@ class PointBranch(NamedTuple):
     cut_cycle: Tensor
     points_cycle: Tensor
     tangents: Tensor
+    unfolding: Tensor
 
 
 class GridBranch(NamedTuple):
@@ -247,32 +250,48 @@ class Networks(nn.Module):
                 module.precision = precision
 
     def forward(self, points: Tensor | None, grid: Tensor | None) -> Cycle:
-        """Both branches at points P (N, 3) and lattice G (M, 2); None leaves a branch out.
+        """Both branches at points P and lattice G (M, 2); None leaves a branch out.
 
-        Both go through Wrap and Stitch, the only networks with tangents, together.
+        Both go through Wrap and Stitch, where the tangents are, together.
+
+        Args:
+            points: (1, N, 3), or (3, N, 3) with two tangent vectors of the surface at each point.
+            grid: (M, 2).
         """
         wrapped = []
         if points is not None:
-            cut = self.cut(points[None])
-            wrapped.append(self.unwrap(cut)[0])
+            cut = self.cut(points)
+            flat = self.unwrap(cut)
+            wrapped.append(flat[0])
         if grid is not None:
             wrapped.append(self.deform(grid[None])[0])
         uv = torch.cat(wrapped)
         axes = torch.eye(2, dtype=uv.dtype, device=uv.device)[:, None].expand(2, len(uv), 2)
         opened = self.wrap(torch.cat([uv[None], axes]))
         closed = self.stitch(opened)
-        count = 0 if points is None else len(points)
+        count = 0 if points is None else points.shape[1]
         point_branch = grid_branch = None
         if points is not None:
             point_branch = PointBranch(
-                points, cut[0], uv[:count], opened[0, :count], closed[0, :count], closed[1:, :count]
+                points=points[0],
+                cut=cut[0],
+                uv=uv[:count],
+                cut_cycle=opened[0, :count],
+                points_cycle=closed[0, :count],
+                tangents=closed[1:, :count],
+                unfolding=flat[1:],
             )
         if grid is not None:
             on_shape = closed[0, count:]
             reopened = self.cut(on_shape[None])
             flattened = self.unwrap(reopened)[0]
             grid_branch = GridBranch(
-                uv[count:], opened[0, count:], on_shape, closed[1:, count:], reopened[0], flattened
+                uv=uv[count:],
+                cut=opened[0, count:],
+                points=on_shape,
+                tangents=closed[1:, count:],
+                cut_cycle=reopened[0],
+                uv_cycle=flattened,
             )
         return Cycle(point_branch, grid_branch)
 

@@ -10,6 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
+from scipy import sparse
+from scipy.sparse import csgraph
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 from torch import Tensor
 
@@ -155,8 +157,8 @@ class Trainer:
         self.precision = usable_precision(preset.precision, device)
         self.networks.train_in(PRECISIONS[self.precision])
         self.optimizer = AdamW(list(self.networks.parameters()), preset.weight_decay)
-        self.shape = torch.as_tensor(points, dtype=torch.float32)
-        self.hull = torch.as_tensor(hull_sample(points, len(points), seed), dtype=torch.float32)
+        self.shape = self._prepared(points)
+        self.hull = self._prepared(hull_sample(points, len(points), seed))
         self.noise = preset.perturbation * mean_spacing(points)
         self.device = device
         self.iteration = 0
@@ -172,8 +174,9 @@ class Trainer:
     @property
     def weights(self) -> dict[str, float]:
         """The weight of each term of the objective."""
-        names = ("unwrap", "wrap", "cycle", "distortion", "anti_flip")
-        return {name: getattr(self.preset, f"{name}_weight") for name in names}
+        names = ("unwrap", "wrap", "cycle", "distortion", "anti_flip", "unfolding")
+        given = {name: float(getattr(self.preset, f"{name}_weight")) for name in names}
+        return {name: weight for name, weight in given.items() if weight or name != "unfolding"}
 
     @property
     def progress(self) -> float:
@@ -259,6 +262,13 @@ class Trainer:
             raise DivergedError("training diverged twice, the second time with a smaller step")
         self._restore(self._good)
 
+    def _prepared(self, points: FloatArray) -> Tensor:
+        """(1, N, 3) points, or (3, N, 3) with their tangent frames where a term asks for these."""
+        rows = points[None]
+        if self.preset.unfolding_weight:
+            rows = np.concatenate([rows, tangent_frames(points)])
+        return torch.as_tensor(rows, dtype=torch.float32)
+
     def _fits(self, seconds: float) -> bool:
         """Whether a step of this length still ends within the time budget."""
         return self.time_budget is None or self.seconds + seconds <= self.time_budget
@@ -276,7 +286,7 @@ class Trainer:
             grid if self.preset.branches != "3d" else None,
         )
         try:
-            terms = objective_terms(self.preset, cycle, points)
+            terms = objective_terms(self.preset, cycle, points[0])
         except losses.NotFiniteError:
             return {"total": math.nan}
         total = torch.stack([self.weights[name] * value for name, value in terms.items()]).sum()
@@ -290,14 +300,15 @@ class Trainer:
         return (last + (first - last) * cosine) * SMALLER_STEP**self.divergences
 
     def _batch(self) -> tuple[Tensor, Tensor]:
-        """Perturbed points (n, 3) of the phase and a perturbed lattice (about n, 2)."""
+        """Perturbed points of the phase (see `_prepared`) and a perturbed lattice (about n, 2)."""
         cloud = self.hull if self._phase() == "hull" else self.shape
-        if self._phase() != "all" and self.preset.subset < len(cloud):
-            cloud = cloud[
-                torch.randperm(len(cloud), generator=self.generator)[: self.preset.subset]
-            ]
-        noise = self.noise * torch.randn(cloud.shape, generator=self.generator)
-        grid = lattice(round(math.sqrt(len(cloud))), self.generator)
+        size = cloud.shape[1]
+        if self._phase() != "all" and self.preset.subset < size:
+            size = self.preset.subset
+            cloud = cloud[:, torch.randperm(cloud.shape[1], generator=self.generator)[:size]]
+        noise = torch.zeros_like(cloud)
+        noise[0] = self.noise * torch.randn(size, 3, generator=self.generator)
+        grid = lattice(round(math.sqrt(size)), self.generator)
         return (cloud + noise).to(self.device), grid.to(self.device)
 
 
@@ -314,6 +325,8 @@ def objective_terms(preset: Preset, cycle: Cycle, points: Tensor) -> dict[str, T
         )
         cycle_terms += [(there.points, there.points_cycle), (there.cut, there.cut_cycle)]
         tangents_at.append((there.points_cycle, there.tangents))
+        if len(there.unfolding):
+            terms["unfolding"] = losses.unfolding_loss(there.unfolding)
     if cycle.grid is not None:
         back = cycle.grid
         terms["wrap"] = losses.wrap_loss(back.points, points)
@@ -350,6 +363,39 @@ def lattice(side: int, generator: torch.Generator) -> Tensor:
 def mean_spacing(points: FloatArray) -> float:
     """Mean distance from each of (N, 3) points to its nearest other one."""
     return float(cKDTree(points).query(points, 2)[0][:, 1].mean())
+
+
+def oriented_normals(points: FloatArray, neighbours: int = 12) -> FloatArray:
+    """(N, 3) unit normals, oriented alike along a spanning tree (Hoppe et al. 1992).
+
+    Least principal directions of the nearest neighbours; the tree prefers parallel ones.
+    """
+    near = cKDTree(points).query(points, min(neighbours, len(points)))[1]
+    offsets = points[near] - points[near].mean(axis=1, keepdims=True)
+    normals = np.linalg.eigh(np.einsum("nki,nkj->nij", offsets, offsets))[1][:, :, 0]
+    rows = np.repeat(np.arange(len(points)), near.shape[1] - 1)
+    columns = near[:, 1:].ravel()
+    apart = 1.0 + 1e-6 - np.abs((normals[rows] * normals[columns]).sum(axis=1))
+    size = (len(points), len(points))
+    tree = csgraph.minimum_spanning_tree(sparse.coo_matrix((apart, (rows, columns)), size).tocsr())
+    waiting = np.ones(len(points), dtype=bool)
+    while waiting.any():
+        root = int(np.argmax(waiting))
+        order, parents = csgraph.breadth_first_order(tree, root, directed=False)
+        waiting[order] = False
+        for child in order[1:]:
+            if normals[child] @ normals[parents[child]] < 0:
+                normals[child] *= -1
+    return np.asarray(normals)
+
+
+def tangent_frames(points: FloatArray) -> FloatArray:
+    """(2, N, 3) orthonormal tangent vectors, right-handed around the oriented normals."""
+    normals = oriented_normals(points)
+    least = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    first = np.cross(normals, least)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(normals, first)])
 
 
 def hull_sample(points: FloatArray, count: int, seed: int) -> FloatArray:

@@ -108,3 +108,17 @@ def test_anti_flip_loss_counts_neighbours_that_turn_away() -> None:
     v[3] = tensor([0.0, 0.0, 1.0])
     at_right_angle = losses.anti_flip_loss(points, torch.stack([u, v]), 1, math.pi / 2)
     assert float(at_right_angle) == pytest.approx(0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("J", "expected"),
+    [
+        ([[2.0, 0.0], [0.0, 2.0]], 0.0),  # a similarity
+        ([[2.0, 0.0], [0.0, -2.0]], 2.0),  # a mirror
+        ([[2.0, 0.0], [0.0, 0.0]], 1.0),  # collapsed
+        ([[2.0, 0.0], [0.0, 1.0]], 0.2),  # (2 - 1)^2 / (2^2 + 1^2)
+    ],
+)
+def test_unfolding_loss_by_hand(J: list[list[float]], expected: float) -> None:
+    images = tensor(J)[:, None].repeat(1, 3, 1)
+    assert float(losses.unfolding_loss(images)) == pytest.approx(expected, abs=1e-6)

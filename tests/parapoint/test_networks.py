@@ -87,7 +87,7 @@ def test_both_branches_are_the_compositions_of_the_paper() -> None:
     net = networks()
     points = torch.randn(9, 3, generator=generator())
     grid = torch.rand(4, 2, generator=generator())
-    there, back = net(points, grid)
+    there, back = net(points[None], grid)
     torch.testing.assert_close(there.cut, net.cut(points[None])[0])
     torch.testing.assert_close(there.uv, net.unwrap(there.cut[None])[0])
     torch.testing.assert_close(there.uv, net.parameterization(points))
@@ -106,7 +106,7 @@ def test_both_branches_are_the_compositions_of_the_paper() -> None:
 
 def test_a_branch_can_be_left_out() -> None:
     net = networks(hidden=(4,))
-    points, grid = torch.zeros(5, 3), torch.zeros(3, 2)
+    points, grid = torch.zeros(1, 5, 3), torch.zeros(3, 2)
     both, there, back = net(points, grid), net(points, None), net(None, grid)
     assert there.grid is None
     assert back.point is None
@@ -132,8 +132,19 @@ def test_bfloat16_is_for_training_alone_and_keeps_the_gradient_s_direction() -> 
         assert torch.equal(reduced.parameterization(points), exact.parameterization(points))
     gradients = []
     for net in (exact, reduced):
-        for output in net(points, grid):
+        for output in net(points[None], grid):
             sum(part.square().sum() for part in output).backward(retain_graph=True)
         gradients.append(torch.cat([p.grad.flatten() for p in net.parameters()]))
     assert not torch.equal(*gradients)
     assert torch.nn.functional.cosine_similarity(*gradients, dim=0) > 0.99
+
+
+def test_tangents_of_the_surface_are_unfolded() -> None:
+    net = networks("softplus", hidden=(8,)).double()
+    points = torch.randn(5, 3, generator=generator(), dtype=torch.float64)
+    axes = torch.eye(3, dtype=torch.float64)[:2, None].expand(2, 5, 3)
+    there, _ = net(torch.cat([points[None], axes]), None)
+    jacobian = torch.autograd.functional.jacobian(
+        lambda p: net.parameterization(p[None])[0], points[3]
+    )
+    torch.testing.assert_close(there.unfolding[:, 3].T, jacobian[:, :2])

@@ -7,7 +7,16 @@ import torch
 
 from parapoint import losses, trainer
 from parapoint.presets import PAPER
-from parapoint.trainer import AdamW, DivergedError, Trainer, hull_sample, lattice, surface_sample
+from parapoint.trainer import (
+    AdamW,
+    DivergedError,
+    Trainer,
+    hull_sample,
+    lattice,
+    oriented_normals,
+    surface_sample,
+    tangent_frames,
+)
 
 TINY = replace(PAPER, hidden=(8, 8), embedding=4, subset=100, iterations=40, points=200)
 
@@ -52,7 +61,7 @@ def test_the_run_goes_from_the_hull_to_a_subset_to_all_points(monkeypatch) -> No
 
     def batch(self: Trainer) -> tuple[torch.Tensor, torch.Tensor]:
         points, grid = keep(self)
-        seen.append((len(points), len(grid)))
+        seen.append((points.shape[1], len(grid)))
         return points, grid
 
     monkeypatch.setattr(Trainer, "_batch", batch)
@@ -104,12 +113,13 @@ def test_the_learning_rate_follows_a_cosine() -> None:
 def test_the_schedule_follows_a_time_budget_that_ends_first(monkeypatch) -> None:
     clock = iter(range(1000))
     monkeypatch.setattr(trainer.time, "perf_counter", lambda: float(next(clock)))  # 1 s a step
-    of = Trainer(sphere(), TINY, seed=0, device="cpu", time_budget=10.0)
+    preset = replace(TINY, warm_up=0.25, all_from=0.75)
+    of = Trainer(sphere(), preset, seed=0, device="cpu", time_budget=10.0)
     steps = list(of.run())
     assert len(steps) == 10
     assert steps[4].progress == pytest.approx(0.5)
     assert of._learning_rate() == pytest.approx(1e-5)
-    assert {step.phase for step in steps} == {"hull", "subset"}  # no step began after 99 %
+    assert [step.phase for step in steps] == ["hull"] * 3 + ["subset"] * 5 + ["all"] * 2
 
 
 def test_the_same_seed_gives_the_same_weights_and_leaves_torch_s_generator_alone() -> None:
@@ -223,3 +233,28 @@ def test_terms_of_the_objective_use_the_preset(monkeypatch) -> None:
     )
     next(tiny().run())
     assert calls == {"unwrap": (8, 0.1), "flip": (4, math.pi / 2)}
+
+
+def test_normals_are_oriented_alike() -> None:
+    points = sphere(1000)
+    outward = (oriented_normals(points) * points).sum(axis=1)
+    assert np.abs(outward).min() > 0.9
+    assert abs(np.sign(outward).sum()) == 1000
+    two = np.concatenate([points, points + 10])  # two components are each oriented
+    outward = (oriented_normals(two) * np.concatenate([points, points])).sum(axis=1)
+    assert abs(np.sign(outward[:1000]).sum()) == abs(np.sign(outward[1000:]).sum()) == 1000
+
+
+def test_tangent_frames_are_right_handed_around_the_normals() -> None:
+    points = sphere(500)
+    first, second = tangent_frames(points)
+    np.testing.assert_allclose(np.cross(first, second), oriented_normals(points), atol=1e-12)
+    np.testing.assert_allclose((first * second).sum(axis=1), 0, atol=1e-12)
+
+
+def test_the_unfolding_term_counts_only_with_a_weight() -> None:
+    assert "unfolding" not in tiny().weights
+    of = tiny(iterations=1, unfolding_weight=0.1)
+    terms = next(of.run()).losses
+    assert of.weights["unfolding"] == 0.1
+    assert 0 <= terms["unfolding"] <= 2
