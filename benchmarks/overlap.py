@@ -77,12 +77,15 @@ def overlaps(parameterization: Parameterization, sign: IntArray, angle: FloatArr
         first, second = present[i], present[j]
         kept = ~_share_an_entry(fans, first, second)
         first, second = first[kept], second[kept]
+        # The smaller triangle comes first: it is the one to be clipped.
+        larger_first = double_area[first] > double_area[second]
+        first, second = np.where(larger_first, (second, first), (first, second))
+        a, b = _across(images, first), _across(images, second)
         tolerance = ROUNDING * extent * np.minimum(longest[first], longest[second])
-        kept = ~separated(images[first], images[second], tolerance)
+        kept = ~separated(a, b, tolerance)
         first, second, tolerance = first[kept], second[kept], tolerance[kept]
-        common = common_area(images[first], images[second])
-        smaller = np.minimum(double_area[first], double_area[second]) / 2
-        kept = common > np.maximum(SMALLEST_SHARE * smaller, tolerance)
+        common = common_area(a[:, :, kept], b[:, :, kept])
+        kept = common > np.maximum(SMALLEST_SHARE * double_area[first] / 2, tolerance)
         first, second, common = first[kept], second[kept], common[kept]
         np.add.at(area, first, common)
         np.add.at(area, second, common)
@@ -177,6 +180,11 @@ def _morton_order(points: FloatArray) -> IntArray:
     return np.asarray(order, dtype=np.int64)
 
 
+def _across(images: FloatArray, chosen: IntArray) -> FloatArray:
+    """(3, 2, N) the chosen triangles, each coordinate of all of them in one piece of memory."""
+    return np.ascontiguousarray(images.take(chosen, axis=0).transpose(1, 2, 0))
+
+
 def _share_an_entry(rows: IntArray, i: IntArray, j: IntArray) -> BoolArray:
     """(N,) whether rows i and j of an (F, 3) array have an entry in common."""
     a, b = rows.take(i, axis=0), rows.take(j, axis=0)
@@ -191,63 +199,66 @@ def separated(a: FloatArray, b: FloatArray, tolerance: FloatArray) -> BoolArray:
     """(N,) whether a side of one of two counter-clockwise triangles has the other outside.
 
     Args:
-        a: (N, 3, 2) triangles.
-        b: (N, 3, 2) triangles.
+        a: (3, 2, N) triangles, so that each operation runs along all pairs.
+        b: (3, 2, N) triangles.
         tolerance: (N,) a point no further inside than this over the side's length is outside.
     """
-    apart = np.zeros(len(a), dtype=bool)
+    apart = np.zeros(a.shape[2], dtype=bool)
     for one, other in ((a, b), (b, a)):
         for k in range(3):
-            left = np.flatnonzero(~apart)
-            start, end = one[left, k], one[left, (k + 1) % 3]
-            side = end - start
-            offset = other[left] - start[:, None]
-            inside = side[:, :1] * offset[:, :, 1] - side[:, 1:] * offset[:, :, 0]
-            apart[left] = (inside <= tolerance[left, None]).all(axis=1)
+            inside = _inside(other[:, 0], other[:, 1], one[k], one[(k + 1) % 3])
+            apart |= np.maximum(np.maximum(inside[0], inside[1]), inside[2]) <= tolerance
     return apart
 
 
 def common_area(a: FloatArray, b: FloatArray) -> FloatArray:
     """(N,) area that two counter-clockwise triangles have in common.
 
-    The Sutherland-Hodgman clip of `a` by each side of `b`, on all pairs at once. A polygon is an
-    (N, k, 2) array; rows with fewer than k corners repeat their first one, which adds no area.
+    `a`, best the smaller one, is clipped by each side of `b` in turn. What lies beyond a side is
+    moved onto its line, where it encloses no area, so that all polygons keep one length.
 
     Args:
-        a: (N, 3, 2) triangles.
-        b: (N, 3, 2) triangles.
+        a: (3, 2, N) triangles.
+        b: (3, 2, N) triangles.
     """
-    origin = a[:, :1]
-    polygon, clip = a - origin, b - origin
+    origin = a[0]
+    x, y = (a - origin)[:, 0], (a - origin)[:, 1]
+    clip = b - origin
     for k in range(3):
-        polygon = _clipped(polygon, clip[:, k], clip[:, (k + 1) % 3])
-    following = np.roll(polygon, -1, axis=1)
-    doubled = polygon[:, :, 0] * following[:, :, 1] - polygon[:, :, 1] * following[:, :, 0]
-    return np.asarray(np.maximum(doubled.sum(axis=1) / 2, 0.0))
+        x, y = _clipped(x, y, clip[k], clip[(k + 1) % 3])
+    doubled = (x * np.roll(y, -1, axis=0) - y * np.roll(x, -1, axis=0)).sum(axis=0)
+    return np.asarray(np.maximum(doubled / 2, 0.0))
 
 
-def _clipped(polygon: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
-    """(N, k + 1, 2) the part of convex polygons (N, k, 2) to the left of start -> end (N, 2)."""
-    count, size, _ = polygon.shape
+def _inside(x: FloatArray, y: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+    """(k, N) distance of points to the left of start -> end (2, N), times the length of that."""
     side = end - start
-    offset = polygon - start[:, None]
-    height = side[:, :1] * offset[:, :, 1] - side[:, 1:] * offset[:, :, 0]
-    following, next_height = np.roll(polygon, -1, axis=1), np.roll(height, -1, axis=1)
-    crosses = (height >= 0) != (next_height >= 0)
-    fraction = np.zeros_like(height)
-    np.divide(height, height - next_height, out=fraction, where=crosses)
-    crossing = polygon + fraction[:, :, None] * (following - polygon)
-    # Each side hands on its start if inside, then its crossing: up to two corners, in order.
-    corners = np.stack([polygon, crossing], axis=2).reshape(count, 2 * size, 2)
-    handed_on = np.stack([height >= 0, crosses], axis=2).reshape(count, 2 * size)
-    place = np.cumsum(handed_on, axis=1) - 1
-    # A convex polygon has two crossings; rounding may add more, which the last place absorbs.
-    row, column = np.nonzero(handed_on)
-    first = corners[np.arange(count), handed_on.argmax(axis=1)]
-    clipped = np.repeat(first[:, None], size + 1, axis=1)
-    clipped[row, np.minimum(place[row, column], size)] = corners[row, column]
-    # Nothing left: `first` is an outside corner repeated, which has no area.
-    return clipped
+    return np.asarray(side[0] * (y - start[1]) - side[1] * (x - start[0]))
+
+
+def _clipped(
+    x: FloatArray, y: FloatArray, start: FloatArray, end: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Polygons of 2k corners: those of k corners (k, N) to the left of start -> end (2, N).
+
+    Each corner hands on itself, or its foot on the line, and then the crossing of the side that
+    follows, or itself once more.
+    """
+    inside = _inside(x, y, start, end)
+    following = np.roll(inside, -1, axis=0)
+    crosses = (inside < 0) != (following < 0)
+    fraction = np.zeros_like(inside)
+    np.divide(inside, inside - following, out=fraction, where=crosses)
+    side = end - start
+    foot = np.minimum(inside, 0.0) / (side[0] ** 2 + side[1] ** 2)
+    clipped = []
+    for values, normal in ((x, side[1]), (y, -side[0])):
+        corners = np.empty((2 * len(values), values.shape[1]))
+        corners[0::2] = values + foot * normal
+        crossing = values + fraction * (np.roll(values, -1, axis=0) - values)
+        corners[1::2] = np.where(crosses, crossing, corners[0::2])
+        clipped.append(corners)
+    return clipped[0], clipped[1]
 
 
 def covered_area(images: FloatArray) -> float:
