@@ -1,0 +1,267 @@
+"""What a results folder holds, as a report reads it: cells by suite, model and named method."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from benchmarks.metrics import METRICS
+from benchmarks.results import ResultRow, Store
+from benchmarks.suites import SUITES
+from parapoint.errors import InputError
+
+DISPLAY: dict[str, tuple[str, str]] = {
+    "tutte": ("Tutte", "uniform weights"),
+    "harmonic": ("Harmonic", "cotangent weights"),
+    "lscm": ("LSCM", "linear conformal energy"),
+    "bff": ("BFF", "boundary first, conformal"),
+    "arap": ("ARAP", "as-rigid-as-possible energy"),
+    "slim": ("SLIM", ""),
+    "xatlas": ("xatlas", "many charts"),
+    "uvunwrap": ("uvunwrap", "many charts"),
+    "meshlab_lscm": ("MeshLab LSCM", "linear conformal energy"),
+    "meshlab_harmonic": ("MeshLab harmonic", "cotangent weights"),
+    "meshlab_voronoi": ("MeshLab Voronoi atlas", "many charts"),
+    "meshlab_triangles": ("MeshLab triangles", "a chart for each face"),
+    "external": ("External", ""),
+    "fam": ("FAM", ""),
+    "parapoint": ("ParaPoint", ""),
+}
+"""Name of a method in print and, where its parameters do not say it, what it minimises.
+
+The order is that of the tables; methods from elsewhere stand between, ParaPoint last.
+"""
+
+TOLD = ("preset", "energy", "loss", "iterations", "points", "time_budget")
+"""Parameters, or entries of a method's report, that are part of its name in a table."""
+
+
+@dataclass(frozen=True)
+class Label:
+    """A method with its parameters, as tables and figures name it.
+
+    Attributes:
+        method: registry name.
+        params: its parameters as JSON, keys sorted.
+        name: the name in print, such as "SLIM".
+        detail: energy, iterations and other things told, such as "conformal, 20 iterations".
+        short: a name for axes and column heads, no other label of the folder has it.
+    """
+
+    method: str
+    params: str
+    name: str
+    detail: str
+    short: str
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Its parameters by name."""
+        found: dict[str, Any] = json.loads(self.params)
+        return found
+
+    @property
+    def text(self) -> str:
+        """Name and detail."""
+        return f"{self.name} ({self.detail})" if self.detail else self.name
+
+
+def _key(row: ResultRow) -> tuple[str, str]:
+    return row.method, json.dumps(row.params, sort_keys=True)
+
+
+def _rank(method: str) -> int:
+    order = list(DISPLAY)
+    return order.index(method) if method in order else order.index("fam")
+
+
+def _words(name: str, value: object) -> str:
+    """A parameter in words, "" where there is nothing to tell."""
+    if value is None or value == "":
+        return ""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        unit = {"time_budget": "s budget"}.get(name, name.replace("_", " "))
+        return f"{value:,} {unit.removesuffix('s') if value == 1 else unit}"
+    return str(value).replace("_", " ").replace("dirichlet", "Dirichlet")
+
+
+def _told(rows: Sequence[ResultRow], name: str) -> str:
+    """What the rows of one method say of parameter `name`: its value, or the range it took."""
+    values: list[Any] = []
+    for row in rows:
+        value = row.report.get(name)
+        value = row.params.get(name) if value is None else value
+        if value is not None and not isinstance(value, list | dict) and value not in values:
+            values.append(value)
+    if len(values) > 1 and all(isinstance(value, int | float) for value in values):
+        return f"{min(values):,} to {_words(name, max(values))}"
+    return " / ".join(_words(name, value) for value in values)
+
+
+def labels(rows: Iterable[ResultRow]) -> dict[tuple[str, str], Label]:
+    """The label of each (method, params) in `rows`, in the order of the tables."""
+    by_key: dict[tuple[str, str], list[ResultRow]] = {}
+    for row in rows:
+        by_key.setdefault(_key(row), []).append(row)
+    keys = sorted(by_key, key=lambda key: (_rank(key[0]), key[0]))  # stable: else as they ran
+    params = {
+        key: {n: v for n, v in by_key[key][0].params.items() if n != "device"} for key in keys
+    }
+    found: dict[tuple[str, str], Label] = {}
+    for key in keys:
+        method = key[0]
+        name, fixed = DISPLAY.get(method, (method, ""))
+        told = [_told(by_key[key], entry) for entry in TOLD]
+        siblings = [params[other] for other in keys if other[0] == method and other != key]
+        differing = [
+            entry
+            for entry, value in params[key].items()
+            if any(other.get(entry) != value for other in siblings)
+        ]
+        told += [
+            f"{entry.replace('_', ' ')} {params[key][entry]}"
+            for entry in differing
+            if entry not in TOLD
+        ]
+        short, rivals = name, siblings
+        for entry in differing:
+            fewer = [other for other in rivals if other.get(entry) == params[key][entry]]
+            if len(fewer) < len(rivals):
+                short += f" {_words(entry, params[key][entry]) or 'default'}"
+                rivals = fewer
+        detail = ", ".join(part for part in (fixed, *told) if part)
+        found[key] = Label(method, key[1], name, detail, short)
+    taken: dict[str, int] = {}
+    for key, label in found.items():
+        taken[label.short] = taken.get(label.short, 0) + 1
+        if taken[label.short] > 1:
+            unique = f"{label.short} #{taken[label.short]}"
+            found[key] = dataclasses.replace(label, short=unique)
+    return found
+
+
+def suite_title(name: str) -> str:
+    """The heading of a suite."""
+    return SUITES[name].title if name in SUITES else name
+
+
+@dataclass(frozen=True, eq=False)
+class Contents:
+    """The cells of one suite of a results folder.
+
+    Attributes:
+        store: where the maps are.
+        suite: its name.
+        rows: the latest row of each cell.
+        labels: the label of each row, by its id.
+        measured: one row a cell: case, label (short), seed, status, id, seconds, every metric.
+    """
+
+    store: Store
+    suite: str
+    rows: tuple[ResultRow, ...]
+    labels: Mapping[str, Label]
+    measured: pd.DataFrame
+
+    @cached_property
+    def cases(self) -> list[str]:
+        """The models, in the order in which they ran."""
+        return list(dict.fromkeys(row.case for row in self.rows))
+
+    @cached_property
+    def methods(self) -> list[Label]:
+        """The methods, in the order of the tables."""
+        seen = {label.short: label for label in labels(self.rows).values()}
+        return list(seen.values())
+
+    @cached_property
+    def metrics(self) -> list[str]:
+        """Names of the metrics that have a value here, in the order of METRICS."""
+        return [name for name in METRICS if self.measured[name].notna().any()]
+
+    def cell(self, case: str, label: Label) -> list[ResultRow]:
+        """The rows of a model and a method, one a seed."""
+        return [row for row in self.rows if row.case == case and self.labels[row.id] == label]
+
+    def shown(self, case: str, label: Label) -> ResultRow | None:
+        """The row whose map stands for a model and a method in figures: the first seed's, if ok."""
+        good = [row for row in self.cell(case, label) if row.status == "ok"]
+        return min(good, key=lambda row: row.seed) if good else None
+
+    @cached_property
+    def atlases(self) -> frozenset[str]:
+        """Short names of the methods that cut into many charts: no rivals of one-chart maps."""
+        charts = self.means.pivot_table(index="case", columns="label", values="chart_count")
+        many = charts.gt(3 * charts.min(axis=1).clip(lower=1), axis=0).any()
+        return frozenset(str(name) for name in many.index[many])
+
+    @cached_property
+    def means(self) -> pd.DataFrame:
+        """One row a (case, label): means over the seeds that ended well, and counts.
+
+        Columns: case, label, ok, tried, skipped, status, reason, preprocessing, seconds, metrics.
+        A skipped cell was not tried.
+        """
+        records = []
+        for case in self.cases:
+            for label in self.methods:
+                rows = self.cell(case, label)
+                if not rows:
+                    continue
+                ids = [row.id for row in rows if row.status == "ok"]
+                values = self.measured[self.measured["id"].isin(ids)]
+                bad = [row for row in rows if row.status != "ok"]
+                record: dict[str, Any] = {
+                    "case": case,
+                    "label": label.short,
+                    "ok": len(ids),
+                    "tried": sum(row.status != "skipped" for row in rows),
+                    "skipped": sum(row.status == "skipped" for row in rows),
+                    "status": "ok" if ids else bad[0].status,
+                    "reason": bad[0].reason if bad else "",
+                    "preprocessing": rows[0].preprocessing,
+                }
+                for name in ("seconds", *METRICS):
+                    record[name] = values[name].mean() if len(values) else None
+                records.append(record)
+        frame = pd.DataFrame.from_records(records)
+        numbers = ["seconds", *METRICS]
+        return frame.astype(dict.fromkeys(numbers, "float64"))
+
+
+def contents(folder: Path) -> list[Contents]:
+    """What `folder` holds, suite by suite.
+
+    Raises:
+        InputError: the folder is missing, holds no results, or is of a newer version.
+    """
+    if not folder.exists():
+        raise InputError(f"{folder}: no such folder; `python -m benchmarks run` makes one")
+    store = Store(folder)
+    rows = store.rows()
+    if not rows:
+        raise InputError(
+            f"{folder} holds no results: it has no readable line in runs.jsonl; "
+            "`python -m benchmarks run` writes them"
+        )
+    frame = store.metrics()
+    found = []
+    for suite in dict.fromkeys(row.suite for row in rows):
+        own = tuple(row for row in rows if row.suite == suite)
+        by_key = labels(own)
+        by_id = {row.id: by_key[_key(row)] for row in own}
+        seconds = {row.id: row.seconds for row in own}
+        part = frame[frame["id"].isin(by_id)].drop(columns=["method", "params", "suite"])
+        part = part.assign(
+            label=part["id"].map(lambda key, by_id=by_id: by_id[key].short),
+            seconds=part["id"].map(seconds).astype("float64"),
+        )
+        found.append(Contents(store, suite, own, by_id, part))
+    return found

@@ -1,0 +1,349 @@
+"""The rendered pictures of a report: each model, and each map on its model and in the plane.
+
+They are the expensive part, so they are kept: a picture is drawn again only if the surface, the map
+or the source of the renderer has changed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib import colormaps
+from PIL import Image as Images
+
+from benchmarks.distortion import FaceDistortion
+from benchmarks.metrics import MapState
+from benchmarks.results import ResultRow, Store
+from parapoint.errors import InputError
+from parapoint.parameterization import Parameterization
+from parapoint.surface import BoolArray, FloatArray, Mesh
+from reports import render
+from reports.contents import Contents
+from reports.render import Camera, Floats, Image, Scene, View
+
+SIZE, SAMPLES = 560, 2
+"""Longer side of a picture in pixels (shown at about half that), and samples along a pixel."""
+
+FIELDS = 44
+"""Fields of the checkerboard along the diagonal of a model's bounding box."""
+
+SPANNING_TONE = render.linear([0.90, 0.91, 0.90])
+
+ANGLE_SCALE, AREA_SCALE = ("magma_r", 0.0, 2.0), ("PuOr_r", -3.0, 3.0)
+"""Colour map and range of log2(sigma1 / sigma2), and of log2(UV area / 3D area)."""
+
+
+def slug(text: str) -> str:
+    """`text` as a part of a file name; a short hash is added where characters had to go."""
+    plain = re.sub(r"[^a-z0-9.]+", "-", text.lower()).strip("-.")[:60]
+    if plain == text.lower():
+        return plain
+    return f"{plain}-{hashlib.sha256(text.encode()).hexdigest()[:6]}".strip("-")
+
+
+@dataclass(frozen=True, eq=False)
+class Map:
+    """A parameterization of a mesh, ready to be drawn.
+
+    Attributes:
+        mesh: the surface.
+        parameterization: its map.
+    """
+
+    mesh: Mesh
+    parameterization: Parameterization
+
+    @cached_property
+    def _state(self) -> MapState:
+        return MapState(self.mesh, self.parameterization)
+
+    @property
+    def spanning(self) -> BoolArray:
+        """(F,) faces that span a learned seam."""
+        return self._state.spanning
+
+    @cached_property
+    def flipped(self) -> BoolArray:
+        """(F,) faces turned against the majority of their chart; spanning faces are not counted."""
+        return self._state.validity.flipped & ~self.spanning
+
+    @property
+    def distortion(self) -> FaceDistortion:
+        """Of the faces that do not span a seam."""
+        return self._state.distortion_without_spanning
+
+    @cached_property
+    def uv(self) -> FloatArray:
+        """(F, 3, 2) uv of the corners: area as on the surface, upright, seen from outside."""
+        uv = self.parameterization.uv[self.parameterization.corners]
+        signed = self._state.triangles.uv_area
+        kept = ~self.spanning if (~self.spanning & (signed != 0)).any() else signed != 0
+        area = float(np.abs(signed[kept]).sum())
+        scale = np.sqrt(self.mesh.face_areas[kept].sum() / area) if area > 0 else 1.0
+        middle = (uv.min(axis=(0, 1)) + uv.max(axis=(0, 1))) / 2
+        uv = (uv - middle) * scale
+        if signed[kept].sum() < 0:
+            uv = uv * [-1, 1]
+        if len(np.unique(self.parameterization.charts())) == 1:
+            points = uv[kept].reshape(-1, 2)
+            _, axes = np.linalg.eigh(np.cov(points.T))
+            up = axes[:, 1] * (1 if axes[1, 1] >= 0 else -1)
+            uv = uv @ np.array([[up[1], up[0]], [-up[0], up[1]]])
+        return np.asarray(uv, dtype=np.float64)
+
+    @cached_property
+    def seams(self) -> FloatArray:
+        """(S, 2, 3) the edges of the surface along which the map is cut."""
+        return np.asarray(self.mesh.vertices[self.parameterization.seams(self.mesh)])
+
+    def by_face(self, values: FloatArray) -> FloatArray:
+        """(F,) `values` of the faces in `distortion`, NaN for the others."""
+        full = np.full(len(self.mesh.faces), np.nan)
+        full[self.distortion.faces] = values
+        return full
+
+    @cached_property
+    def angle(self) -> FloatArray:
+        """(F,) log2(sigma1 / sigma2), 0 where angles are kept; NaN where it is not defined."""
+        found = self.distortion
+        ratio = np.full(len(found.faces), np.inf)
+        ratio[found.finite] = found.sigma1[found.finite] / found.sigma2[found.finite]
+        return self.by_face(np.log2(ratio))
+
+    @cached_property
+    def area(self) -> FloatArray:
+        """(F,) log2(UV area / 3D area), both with sum 1; NaN where it is not defined."""
+        found = self.distortion
+        ratio = np.where(found.finite, found.uv_area / found.area, 1.0)
+        return self.by_face(np.where(found.finite & (ratio > 0), np.log2(ratio), -np.inf))
+
+
+def heat(values: FloatArray, scale: tuple[str, float, float]) -> Floats:
+    """(F, 3) linear colours of `values` on a scale; grey for NaN."""
+    name, low, high = scale
+    known = ~np.isnan(values)
+    place = np.clip((np.where(known, values, low) - low) / (high - low), 0, 1)
+    colours = colormaps[name](place)[:, :3]
+    return render.linear(np.where(known[:, None], colours, 0.8))
+
+
+def textured(view: View, found: Map) -> Image:
+    """The checkerboard on the surface; flips in orange, seams and faces that span one in green."""
+    colours = view.checker(found.uv - found.uv.min(axis=(0, 1)), FIELDS / view.scene.size)
+    colours = _mixed(colours, render.FLIP_ORANGE, found.flipped[view.face], 0.75)
+    colours = _mixed(colours, render.SEAM_GREEN, found.spanning[view.face], 0.8)
+    return view.image(_mixed(colours, render.SEAM_GREEN, view.near_lines(found.seams, 2.6), 1.0))
+
+
+def _mixed(colours: Floats, colour: Floats, where: BoolArray, share: float) -> Floats:
+    """`colours` (S, 3) with `share` of `colour` where said."""
+    mixed = colours.copy()
+    mixed[where] = (1 - share) * colours[where] + share * colour
+    return mixed
+
+
+def meshed(view: View) -> Image:
+    """The bare surface with the edges of its mesh."""
+    cover = view.edge_cover(1.1)
+    return view.image(np.asarray(render.CLAY * (1 - cover) + render.INK * cover, np.float32))
+
+
+class Layout:
+    """The map in the plane. Faces that span a seam lie below the others, pale."""
+
+    def __init__(self, found: Map, size: int) -> None:
+        low = 1e-3 * float(np.ptp(found.uv, axis=(0, 1)).max() or 1)
+        height = np.where(found.spanning, -low, np.where(found.flipped, low, 0.0))
+        corners = np.concatenate(
+            [found.uv, np.broadcast_to(height[:, None, None], (len(height), 3, 1))], axis=2
+        )
+        flat = Mesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+        camera: Camera = render.camera(flat, np.eye(3)[2], np.eye(3)[1])
+        self._map = found
+        self._view = Scene(flat, least=0).view(camera, size, SAMPLES)
+        self._outline = self._view.near_lines(_outline(found), 1.6)
+
+    def image(self, colours: Floats) -> Image:
+        """The layout under `colours` (F, 3) of faces or (F, 3, 3) of corners, charts outlined."""
+        view, found = self._view, self._map
+        at = colours[view.face] if colours.ndim == 2 else view.at_corners(colours)
+        at = np.where(found.spanning[view.face, None], SPANNING_TONE, at).astype(np.float32)
+        return view.image(_mixed(at, render.INK, self._outline, 1.0), lit=False)
+
+
+def _outline(found: Map) -> FloatArray:
+    """(n, 2, 3) the edges around the charts, at the height of `Layout`."""
+    kept = ~found.spanning
+    corners = found.parameterization.corners[kept]
+    halfedges = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2)
+    _, first, count = np.unique(
+        np.sort(halfedges, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    lone = first[count == 1]
+    uv = found.uv[kept]
+    ends = np.stack([uv, np.roll(uv, -1, axis=1)], axis=2).reshape(-1, 2, 2)[lone]
+    return np.concatenate([ends, np.zeros((len(ends), 2, 1))], axis=2)
+
+
+def normal_colours(scene: Scene, camera: Camera) -> Floats:
+    """(F, 3, 3) colours of the corners by their normals as the camera sees them, shaded.
+
+    Seen in the plane they tell which part of the surface lies where.
+    """
+    axes = camera.axes.astype(np.float32)
+    normals = scene.corner_normals @ axes.T
+    sky = scene.coarse_openness[..., None]
+    colours = (0.5 + 0.42 * normals) * (0.30 + 0.70 * sky)
+    return render.linear(np.clip(colours, 0, 1))
+
+
+MODEL_PICTURES = ("mesh-1", "mesh-2")
+MAP_PICTURES = ("checker-1", "checker-2", "layout", "angle", "angle-uv", "area", "area-uv")
+
+
+def model_file(case: str, kind: str) -> str:
+    """File name of a picture of a model."""
+    return f"{slug(case)}.{kind}.png"
+
+
+def map_file(row: ResultRow, kind: str) -> str:
+    """File name of a picture of a map."""
+    return f"{slug(row.case)}.{slug(row.method)}.{row.id[:8]}.{kind}.png"
+
+
+def source_hash(*modules: str) -> str:
+    """Hash of the source of the report, or of some of its modules."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        if not modules or path.stem in modules:
+            digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
+    """Draw the pictures of the suite that `folder` lacks; what could not be drawn, and why.
+
+    `jobs` processes share the models.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    record = folder / "keys.json"
+    known = known_keys(record)
+    source = source_hash("render", "pictures")
+    work: list[list[ResultRow]] = []
+    keys: dict[str, str] = {}
+    for case in contents.cases:
+        rows = [row for row in contents.rows if row.case == case and row.surface_hash]
+        if not rows:
+            continue
+        todo = []
+        latest = rows[-1]
+        wanted = {model_file(case, kind): (latest, "") for kind in MODEL_PICTURES}
+        for row in rows:
+            if row.status == "ok":
+                wanted |= {map_file(row, kind): (row, row.uv_sha256) for kind in MAP_PICTURES}
+        for name, (row, content) in wanted.items():
+            text = f"{source} {row.surface_hash} {content}"
+            keys[name] = hashlib.sha256(text.encode()).hexdigest()[:16]
+            if (known.get(name) != keys[name] or not (folder / name).exists()) and row not in todo:
+                todo.append(row)
+        if todo:
+            work.append(todo)
+    faults: list[str] = []
+    for failed, said in _results(contents.store, work, folder, jobs):
+        faults += said
+        for name in failed:
+            keys.pop(name, None)
+    record.write_text(json.dumps(known | keys, indent=0, sort_keys=True) + "\n")
+    return faults
+
+
+def known_keys(record: Path) -> dict[str, str]:
+    """The keys of what was drawn before; none where the file is missing or damaged."""
+    try:
+        content = json.loads(record.read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
+def _results(
+    store: Store, work: list[list[ResultRow]], folder: Path, jobs: int
+) -> Iterator[tuple[list[str], list[str]]]:
+    if jobs <= 1 or len(work) <= 1:
+        for rows in work:
+            yield draw_model(store.folder, rows, folder)
+        return
+    with ProcessPoolExecutor(min(jobs, len(work)), mp_context=get_context("spawn")) as pool:
+        pending = [pool.submit(draw_model, store.folder, rows, folder) for rows in work]
+        for done in pending:
+            yield done.result()
+
+
+def draw_model(
+    results: Path, rows: list[ResultRow], folder: Path, size: int = SIZE
+) -> tuple[list[str], list[str]]:
+    """Draw a model and the maps of `rows`; the files that could not be drawn, and why."""
+    store = Store(results)
+    case = rows[0].case
+    files = [model_file(case, kind) for kind in MODEL_PICTURES]
+    try:
+        surface = store.surface(rows[-1])
+    except InputError as error:
+        files += [map_file(row, kind) for row in rows for kind in MAP_PICTURES]
+        return files, [f"{case}: no pictures: {error}"]
+    if not isinstance(surface, Mesh):
+        files += [map_file(row, kind) for row in rows for kind in MAP_PICTURES]
+        return files, [f"{case}: a point cloud; only meshes are drawn"]
+    scene = Scene(surface)
+    cameras = render.two_cameras(scene)
+    views = [scene.view(camera, size, SAMPLES) for camera in cameras]
+    for name, view in zip(files, views, strict=True):
+        save(meshed(view), folder / name)
+    failed, faults = [], []
+    for row in rows:
+        if row.status != "ok":
+            continue
+        try:
+            result = store.result(row)
+        except InputError as error:
+            failed += [map_file(row, kind) for kind in MAP_PICTURES]
+            faults.append(f"{case}, {row.method}: no pictures: {error}")
+            continue
+        if isinstance(result, Parameterization) and len(result.corners) == len(surface.faces):
+            for kind, image in map_images(scene, views, Map(surface, result), size).items():
+                save(image, folder / map_file(row, kind))
+        else:
+            failed += [map_file(row, kind) for kind in MAP_PICTURES]
+            faults.append(f"{case}, {row.method}: no pictures: the map is not of this mesh")
+    return failed, faults
+
+
+def map_images(scene: Scene, views: list[View], found: Map, size: int) -> Mapping[str, Image]:
+    """The pictures of a map by their kind."""
+    first, second = views
+    layout = Layout(found, size)
+    angle, area = heat(found.angle, ANGLE_SCALE), heat(found.area, AREA_SCALE)
+    return {
+        "checker-1": textured(first, found),
+        "checker-2": textured(second, found),
+        "layout": layout.image(normal_colours(scene, first.camera)),
+        "angle": first.image(angle[first.face]),
+        "angle-uv": layout.image(angle),
+        "area": first.image(area[first.face]),
+        "area-uv": layout.image(area),
+    }
+
+
+def save(image: npt.NDArray[np.uint8], path: Path) -> None:
+    """Write `image` as a PNG: the same image gives the same bytes."""
+    Images.fromarray(image).save(path, format="PNG")
