@@ -2,11 +2,13 @@
 
 A results folder holds
 
-    runs.jsonl             one line a cell, appended only, by the one process that holds the lock
-    uv/<id>.npz            the map of a cell, written before its line
-    surfaces/<hash>.npz    each surface as loaded
-    environment.json       the format version and one entry a run: commit, versions, machine
-    metrics.parquet        derived from the above, may be deleted at any time
+    runs.jsonl              one line a cell, appended only, by the one process that holds the lock
+    uv/<id>.npz             the map of a cell, written before its line
+    surfaces/<hash>.npz     each surface as loaded
+    references/<hash>.npz   the map that the model of that surface came with
+    environment.json        the format version and one entry a run: commit, versions, machine
+    surfaces.json           derived: which model file gave which surface
+    metrics.parquet         derived from the above; may be deleted, as surfaces.json
 
 Nothing in it is ever overwritten but what is derived. File names are made of hashes alone, and no
 file is ever unpickled.
@@ -53,6 +55,8 @@ FORMAT = 1
 
 IDENTITY_COLUMNS = ("suite", "case", "method", "params", "seed", "status")
 _NAME = re.compile(r"[0-9a-f]{8,64}")
+SOURCE_CHANGED = "the source of the method changed during the run; run again"
+"""Reason of a row that the next run does anew whatever its hash says."""
 _DAMAGE = (
     *(OSError, EOFError, ValueError, TypeError, AttributeError, KeyError, MemoryError),
     *(NotImplementedError, zipfile.BadZipFile, zlib.error),
@@ -403,12 +407,24 @@ class Store:
             raise InputError(f"{row.case}, {row.method}: no map is stored ({row.status})")
         return read_map(self.uv_path(row.id), row.report)
 
+    def reference(self, row: ResultRow) -> Parameterization | None:
+        """The map that the row's model came with, if it did.
+
+        Raises:
+            InputError: its file is damaged.
+        """
+        path = self.reference_path(row.surface_hash)
+        reference = read_map(path) if row.surface_hash and path.exists() else None
+        return reference if isinstance(reference, Parameterization) else None
+
     def unmeasured(self) -> list[ResultRow]:
         """The rows with a map whose metrics are not in `metrics.parquet`, or of an older source."""
         known = self._known_metrics()
         source = _metrics_source()
         return [
-            row for row in self.rows() if row.uv_sha256 and _metrics_key(row, source) not in known
+            row
+            for row in self.rows()
+            if row.uv_sha256 and self._metrics_key(row, source) not in known
         ]
 
     def metrics(self, measured: Mapping[str, Mapping[str, float]] | None = None) -> pd.DataFrame:
@@ -428,7 +444,7 @@ class Store:
         records: list[dict[str, object]] = []
         added = False
         for row in self.rows():
-            key = _metrics_key(row, source)
+            key = self._metrics_key(row, source)
             if key in known:
                 values = known[key]
             else:
@@ -505,7 +521,7 @@ class Store:
         """Where `metrics.parquet` differs from what `sample` of the maps give."""
         known = self._known_metrics()
         source = _metrics_source()
-        keys = {row.id: _metrics_key(row, source) for row in rows}
+        keys = {row.id: self._metrics_key(row, source) for row in rows}
         measured = [row for row in rows if row.status == "ok" and keys[row.id] in known]
         for row in measured[:: max(1, len(measured) // sample)][:sample]:
             stored = known[keys[row.id]]
@@ -534,12 +550,18 @@ class Store:
             return {}
         return {str(key): record for key, record in values.to_dict("index").items()}  # type: ignore[misc]
 
+    def _metrics_key(self, row: ResultRow, source: str) -> str:
+        """What the metrics of a row depend on, as a hash: its map, any reference, their source."""
+        reference = bool(row.surface_hash) and self.reference_path(row.surface_hash).exists()
+        text = f"{row.id} {row.uv_sha256} {reference} {source}"
+        return hashlib.sha256(text.encode()).hexdigest()[:32]
+
     def _measured(self, row: ResultRow) -> dict[str, float]:
         """Every metric of a row's map; none where it has no map or its files are damaged."""
         if not row.uv_sha256:
             return {}
         try:
-            return measured(self.surface(row), self.result(row))
+            return measured(self.surface(row), self.result(row), self.reference(row))
         except InputError as error:
             _log.warning("%s, %s: no metrics: %s", row.case, row.method, error)
             return {}
@@ -547,6 +569,10 @@ class Store:
     def surface_path(self, surface_hash: str) -> Path:
         """Where the surface of that hash lies."""
         return self.folder / "surfaces" / f"{surface_hash}.npz"
+
+    def reference_path(self, surface_hash: str) -> Path:
+        """Where the map lies that the surface of that hash came with."""
+        return self.folder / "references" / f"{surface_hash}.npz"
 
     def uv_path(self, row_id: str) -> Path:
         """Where the map of that row lies."""
@@ -639,6 +665,31 @@ class Store:
                 write_arrays(path, arrays)
         return name
 
+    def add_reference(self, surface_hash: str, reference: Parameterization) -> None:
+        """Store the map that a surface came with, unless it is there."""
+        path = self.reference_path(surface_hash)
+        with disk_said(path):
+            if not path.exists():
+                write_arrays(path, map_arrays(reference))
+
+    def surface_hashes(self) -> dict[str, str]:
+        """Hashes of surfaces in the store by what they were read from, as `note_surfaces` says."""
+        try:
+            known = json.loads((self.folder / "surfaces.json").read_bytes())
+        except (FileNotFoundError, ValueError, RecursionError):
+            return {}
+        return {
+            str(origin): name
+            for origin, name in (known.items() if isinstance(known, dict) else ())
+            if isinstance(name, str) and _NAME.fullmatch(name) and self.surface_path(name).exists()
+        }
+
+    def note_surfaces(self, hashes: Mapping[str, str]) -> None:
+        """Keep what `surface_hashes` is to return: a later run need not read those models."""
+        path = self.folder / "surfaces.json"
+        with disk_said(path), _replacing(path) as stream:
+            stream.write(json.dumps(hashes, indent=1).encode() + b"\n")
+
     def add_map(self, row_id: str, path: Path) -> None:
         """Take over the map file `path`, which lies on the same disk, for the row `row_id`."""
         target = self.uv_path(row_id)
@@ -691,9 +742,11 @@ def read_map(
 
 
 def measured(
-    surface: Surface, result: Parameterization | PointParameterization
+    surface: Surface,
+    result: Parameterization | PointParameterization,
+    reference: Parameterization | None = None,
 ) -> dict[str, float]:
-    """Every metric of a map.
+    """Every metric of a map; with a reference, those against it as well.
 
     Raises:
         InputError: the map is not one of this surface.
@@ -701,15 +754,10 @@ def measured(
     from benchmarks import metrics
 
     if isinstance(surface, Mesh) and isinstance(result, Parameterization):
-        return metrics.evaluate(surface, result)
+        return metrics.evaluate(surface, result, reference)
     if isinstance(surface, PointCloud) and isinstance(result, PointParameterization):
         return metrics.evaluate_points(surface, result)
     raise InputError("a map of a mesh for a point cloud, or the other way round")
-
-
-def _metrics_key(row: ResultRow, source: str) -> str:
-    """What the metrics of a row depend on, as a hash: its map, and the source of the metrics."""
-    return hashlib.sha256(f"{row.id} {row.uv_sha256} {source}".encode()).hexdigest()[:32]
 
 
 def _metric_names() -> list[str]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import hashlib
 import json
 import math
 import os
@@ -28,9 +29,11 @@ import psutil
 
 from baselines import registry
 from benchmarks import environment, models
-from benchmarks.results import ResultRow, Store, disk_said, identity, plain
+from benchmarks.results import SOURCE_CHANGED, ResultRow, Store, disk_said, identity, plain
 from benchmarks.suites import Suite
+from parapoint import files
 from parapoint.errors import InputError
+from parapoint.files import read_parameterized
 from parapoint.surface import Surface
 
 TIME_LIMIT = 1800.0
@@ -41,6 +44,8 @@ GRACE = 15.0
 """Seconds past its limit after which a supervisor itself counts as hung."""
 OUTPUT_KEPT = 1 << 16
 """Bytes of a method's output that are held; what came before is dropped."""
+READERS = ("files", "mesh_formats", "point_formats", "surface")
+"""Modules of `parapoint` that make a surface of a file."""
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
@@ -227,9 +232,11 @@ def _measure(store: Store, pool: _Pool, summary: Summary, progress: Progress) ->
 
     tasks = []
     for row in rows:
+        reference = store.reference_path(row.surface_hash)
         files = {
             "surface": str(store.surface_path(row.surface_hash).resolve()),
             "measure": str(store.uv_path(row.id).resolve()),
+            "reference": str(reference.resolve()) if reference.exists() else "",
         }
         tasks.append(_Task(limits | files, began, ended(row)))
     pool.run(tasks, jobs)
@@ -291,8 +298,16 @@ def _surfaces(
 ) -> dict[str, str]:
     """The hash of each case's surface, stored; "" where the model is missing."""
     hashes = {}
+    known = store.surface_hashes()
+    readers = _readers_hash()
+    before = dict(known)
     for case in cases:
+        model = models.info(case)
+        origin = f"{model.sha256} {readers}" if model else ""
         surface = loaded.get(case)
+        if surface is None and origin in known:
+            hashes[case] = known[origin]
+            continue
         if surface is None:
             try:
                 surface = models.load(case)
@@ -301,9 +316,22 @@ def _surfaces(
         if isinstance(surface, InputError):
             summary.missing[case] = " ".join(str(surface).split())
             hashes[case] = ""
-        else:
-            hashes[case] = store.add_surface(surface)
+            continue
+        hashes[case] = store.add_surface(surface)
+        if model and model.has_uv:
+            store.add_reference(hashes[case], read_parameterized(models.path(case))[1])
+        if model:
+            known[origin] = hashes[case]
+    if known != before:
+        store.note_surfaces(known)
     return hashes
+
+
+def _readers_hash() -> str:
+    """Hash of the source that makes a surface of a file."""
+    folder = Path(files.__file__).parent
+    texts = [path.read_bytes() for path in sorted(folder.glob("*.py")) if path.stem in READERS]
+    return hashlib.sha256(b"".join(texts)).hexdigest()[:16]
 
 
 def _todo(
@@ -371,6 +399,8 @@ def _changed(
         return "method changed"
     if row.surface_hash != cell.surface_hash:
         return "model changed" if row.surface_hash else "model was missing"
+    if row.reason == SOURCE_CHANGED:
+        return "method changed"
     if row.status == "ok":
         return "" if store.uv_path(row.id).exists() else "map missing"
     if row.status == "skipped" and not row.surface_hash:

@@ -45,6 +45,7 @@ import scipy.sparse.linalg  # noqa: F401  as above
 
 from baselines import registry
 from benchmarks.results import (
+    SOURCE_CHANGED,
     arrays_hash,
     map_arrays,
     measured,
@@ -214,8 +215,7 @@ def _outcome(job: dict[str, Any]) -> Outcome:
         registry.register_plugin(plugin)
     _, method = registry.method(job["spec"])
     if registry.source_hash(method) != job["source_hash"]:
-        reason = "the source of the method changed during the run; run again"
-        return {"status": "failed", "reason": reason}
+        return {"status": "failed", "reason": SOURCE_CHANGED}
     whole = read_surface(Path(job["surface"]))
     preprocessing = ""
     try:
@@ -246,7 +246,10 @@ def _outcome(job: dict[str, Any]) -> Outcome:
 def _measured(job: dict[str, Any]) -> Outcome:
     """Every metric of a stored map, numbers as text: JSON has no infinity."""
     surface, result = read_surface(Path(job["surface"])), read_map(Path(job["measure"]))
-    return {"status": "ok", "metrics": {k: repr(v) for k, v in measured(surface, result).items()}}
+    reference = read_map(Path(job["reference"])) if job["reference"] else None
+    assert not isinstance(reference, PointParameterization)
+    values = measured(surface, result, reference)
+    return {"status": "ok", "metrics": {name: repr(value) for name, value in values.items()}}
 
 
 def fault(surface: Surface, result: object) -> str:

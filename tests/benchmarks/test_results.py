@@ -369,6 +369,23 @@ def test_metrics_that_were_computed_elsewhere_are_taken_and_kept(store):
     assert any("symmetric_dirichlet is 7.0 in metrics.parquet" in fault for fault in faults)
 
 
+def test_a_reference_joins_the_metrics_and_asks_for_them_anew(store):
+    row = add(store, Parameterization(FLAT.uv * [2, 1], FLAT.corners))
+    assert store.metrics()["artist_correlation"].isna().all()
+    store.add_reference(row.surface_hash, FLAT)
+    assert [found.id for found in store.unmeasured()] == [row.id]
+    # log sigma varies over the stretched map and not over the reference: no correlation.
+    assert store.metrics()["artist_correlation"].tolist() == [1]
+
+
+def test_surfaces_are_known_by_what_they_were_read_from_while_they_are_there(store):
+    name = store.add_surface(SQUARE)
+    store.note_surfaces({"file": name, "gone": "0" * 32, "evil": "../../x"})
+    assert Store(store.folder).surface_hashes() == {"file": name}
+    (store.folder / "surfaces.json").write_text("rubbish")
+    assert store.surface_hashes() == {}
+
+
 def test_a_damaged_table_is_made_anew(store, caplog):
     add(store)
     frame = store.metrics()

@@ -14,7 +14,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from benchmarks import models, runner
+from benchmarks import models, runner, worker
 from benchmarks.results import ResultRow, Store
 from benchmarks.runner import Summary, run
 from benchmarks.suites import Suite
@@ -134,6 +134,23 @@ def unmeasured(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runner, "_measure", lambda *_: None)
 
 
+class InProcess(runner._Pool):
+    """Does cells where it stands: for what is not about processes."""
+
+    def run(self, tasks, _):
+        for task in tasks:
+            task.began()
+            path = self.folder.with_name("map.npz")
+            outcome = worker._outcome({**task.job, "map": str(path)})
+            task.ended(outcome | {"took": 0.0}, "", path)
+
+
+@pytest.fixture
+def in_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runner, "_measure", lambda *_: None)
+    monkeypatch.setattr(runner, "_Pool", InProcess)
+
+
 def row_of(faulty: tuple[Summary, Store], method: str) -> ResultRow:
     return next(row for row in faulty[1].rows() if row.method == method)
 
@@ -233,7 +250,7 @@ def test_metrics_of_all_cells_are_there_after_a_run(faulty):
     assert values.notna().to_dict() == {row.method: row.status == "ok" for row in faulty[1].rows()}
 
 
-@pytest.mark.usefixtures("unmeasured")
+@pytest.mark.usefixtures("in_process")
 def test_a_method_that_needs_a_disk_is_skipped_on_a_sphere(tmp_path):
     plugins = write_plugin(tmp_path / "plugin.py", {"strict": "return flat(surface)"})
     text = (tmp_path / "plugin.py").read_text()
@@ -254,7 +271,7 @@ def test_the_same_cell_gives_the_same_map(tmp_path, faulty):
     assert hashes["random", 0] != hashes["random", 1]
 
 
-@pytest.mark.usefixtures("unmeasured")
+@pytest.mark.usefixtures("in_process")
 def test_only_what_is_missing_or_changed_runs_again(tmp_path):
     out = tmp_path / "out"
     mesh = tmp_path / "mesh.off"
@@ -294,7 +311,7 @@ def test_a_timeout_runs_again_only_under_a_higher_limit(tmp_path):
     assert statuses == [["timeout"], [], ["ok"]]
 
 
-@pytest.mark.usefixtures("unmeasured")
+@pytest.mark.usefixtures("in_process")
 def test_a_missing_model_is_a_skipped_row_and_the_rest_runs(tmp_path, monkeypatch):
     load = models.load
 
@@ -314,6 +331,18 @@ def test_a_missing_model_is_a_skipped_row_and_the_rest_runs(tmp_path, monkeypatc
             run(both, tmp_path / "asked", cases=["sphere"])
         assert not (tmp_path / "asked").exists()
     assert dict(run(both, tmp_path).reasons) == {"model was missing": 1}
+
+
+def test_a_model_is_read_once_and_its_own_map_is_the_reference(tmp_path, monkeypatch):
+    try:
+        models.load("fish_control_mesh")
+    except models.MissingModelError as error:
+        pytest.skip(str(error))
+    fish = Suite("trial", "A trial", ("fish_control_mesh",), ("lscm",), (0,))
+    run(fish, tmp_path)
+    assert Store(tmp_path).metrics()["artist_correlation"].notna().all()
+    monkeypatch.setattr(models, "load", lambda case: pytest.fail(f"{case} is read again"))
+    assert run(fish, tmp_path).ran == []
 
 
 @pytest.mark.parametrize(
@@ -339,7 +368,7 @@ def test_a_malformed_file_stops_the_run_before_it_begins(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.usefixtures("unmeasured")
+@pytest.mark.usefixtures("in_process")
 def test_a_disk_that_fills_up_ends_the_run_and_keeps_what_is_there(tmp_path, monkeypatch):
     run(suite("tutte"), tmp_path)
     before = (tmp_path / "runs.jsonl").read_bytes()
