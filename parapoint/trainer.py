@@ -194,8 +194,8 @@ class Trainer:
             DivergedError: the loss blew up twice.
         """
         longest = 0.0
+        begin = time.perf_counter()
         while self.progress < 1 and self._fits(longest):
-            begin = time.perf_counter()
             phase = self._phase()
             if phase != self._phase_now:
                 self._phase_now, self._lowest, longest = phase, math.inf, 0.0
@@ -204,9 +204,10 @@ class Trainer:
                 self._sums[name] = self._sums.get(name, 0.0) + value
             self._count += 1
             self.iteration += 1
-            spent = time.perf_counter() - begin
-            longest = max(longest, spent)
-            self.seconds += spent
+            now = time.perf_counter()
+            longest = max(longest, now - begin)
+            self.seconds += now - begin  # what is done between steps counts too
+            begin = now
             means: dict[str, float] = {}
             ends_phase = self.progress == 1 or self._phase() != phase
             if ends_phase or self.progress >= self._next_snapshot:
