@@ -139,14 +139,17 @@ def text(value: float) -> str:
 
 
 def moves(spec: str, golden: Rows, now: Rows, allowed: Mapping[str, Tolerance]) -> list[Move]:
-    """What moved by more than its tolerance, appeared or vanished."""
+    """What moved by more than its tolerance; a cell that is new, gone or ends otherwise is one."""
     found = []
     for case in dict.fromkeys([*golden, *now]):
         before, after = golden.get(case, {}), now.get(case, {})
-        for column in ("status", *COLUMNS):
+        old, new = before.get("status", "no cell"), after.get("status", "no cell")
+        if old != new:
+            found.append(Move(file_name(spec), case, "status", old, new))
+            continue
+        for column in COLUMNS:
             old, new = before.get(column, ""), after.get(column, "")
-            tolerance = allowed.get(column, Tolerance(0, 0, ""))
-            excess = change(old, new, tolerance.relative, tolerance.absolute)
+            excess = change(old, new, allowed[column].relative, allowed[column].absolute)
             if excess > 1:
                 found.append(Move(file_name(spec), case, column, old, new, excess))
     return found
@@ -181,7 +184,8 @@ def measured(suite: Suite) -> dict[str, Rows]:
         if row.case not in summary.missing:
             values = frame.loc[row.id]
             cell: dict[str, str] = {name: text(float(str(values[name]))) for name in COLUMNS}
-            found[summary.spec(row)][row.case] = {"status": str(row.status)} | cell
+            status = "unmeasured" if row.id in summary.unmeasured else str(row.status)
+            found[summary.spec(row)][row.case] = {"status": status} | cell
     return found
 
 
