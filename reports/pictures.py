@@ -161,7 +161,7 @@ def meshed(view: View) -> Image:
 class Layout:
     """The map in the plane. Faces that span a seam lie below the others, pale."""
 
-    def __init__(self, found: Map, size: int) -> None:
+    def __init__(self, found: Map) -> None:
         low = 1e-3 * float(np.ptp(found.uv, axis=(0, 1)).max() or 1)
         height = np.where(found.spanning, -low, np.where(found.flipped, low, 0.0))
         corners = np.concatenate(
@@ -170,7 +170,7 @@ class Layout:
         flat = Mesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
         camera: Camera = render.camera(flat, np.eye(3)[2], np.eye(3)[1])
         self._map = found
-        self._view = Scene(flat, least=0).view(camera, size, SAMPLES)
+        self._view = Scene(flat, shadows=False).view(camera, SIZE, SAMPLES)
         self._outline = self._view.near_lines(_outline(found), 1.6)
 
     def image(self, colours: Floats) -> Image:
@@ -289,9 +289,7 @@ def _results(
             yield done.result()
 
 
-def draw_model(
-    results: Path, rows: list[ResultRow], folder: Path, size: int = SIZE
-) -> tuple[list[str], list[str]]:
+def draw_model(results: Path, rows: list[ResultRow], folder: Path) -> tuple[list[str], list[str]]:
     """Draw a model and the maps of `rows`; the files that could not be drawn, and why."""
     store = Store(results)
     case = rows[0].case
@@ -306,7 +304,7 @@ def draw_model(
         return files, [f"{case}: a point cloud; only meshes are drawn"]
     scene = Scene(surface)
     cameras = render.two_cameras(scene)
-    views = [scene.view(camera, size, SAMPLES) for camera in cameras]
+    views = [scene.view(camera, SIZE, SAMPLES) for camera in cameras]
     for name, view in zip(files, views, strict=True):
         save(meshed(view), folder / name)
     failed, faults = [], []
@@ -320,7 +318,7 @@ def draw_model(
             faults.append(f"{case}, {row.method}: no pictures: {error}")
             continue
         if isinstance(result, Parameterization) and len(result.corners) == len(surface.faces):
-            for kind, image in map_images(scene, views, Map(surface, result), size).items():
+            for kind, image in map_images(scene, views, Map(surface, result)).items():
                 save(image, folder / map_file(row, kind))
         else:
             failed += [map_file(row, kind) for kind in MAP_PICTURES]
@@ -328,10 +326,10 @@ def draw_model(
     return failed, faults
 
 
-def map_images(scene: Scene, views: list[View], found: Map, size: int) -> Mapping[str, Image]:
+def map_images(scene: Scene, views: list[View], found: Map) -> Mapping[str, Image]:
     """The pictures of a map by their kind."""
     first, second = views
-    layout = Layout(found, size)
+    layout = Layout(found)
     angle, area = heat(found.angle, ANGLE_SCALE), heat(found.area, AREA_SCALE)
     return {
         "checker-1": textured(first, found),
@@ -346,4 +344,4 @@ def map_images(scene: Scene, views: list[View], found: Map, size: int) -> Mappin
 
 def save(image: npt.NDArray[np.uint8], path: Path) -> None:
     """Write `image` as a PNG: the same image gives the same bytes."""
-    Images.fromarray(image).save(path, format="PNG")
+    Images.fromarray(image).save(path, format="PNG", compress_level=4)

@@ -127,9 +127,9 @@ class Rays:
             directions.astype(np.float64),
             np.inf,
         )
-        weights = weights[:, -2:].astype(np.float32)
-        weights[face < 0] = 0
-        return face, weights
+        # What a ray that meets nothing leaves behind is no number.
+        known = np.where(face[:, None] >= 0, weights[:, -2:], 0)
+        return face, known.astype(np.float32)
 
     def blocked(self, origins: Floats, directions: Floats) -> BoolArray:
         """(n,) whether each ray meets the surface."""
@@ -162,11 +162,11 @@ class Scene:
     Its large faces are split for the computation of shadows, so that one can fall within a face.
     """
 
-    def __init__(self, mesh: Mesh, *, least: int = FINE_FACES, embree: bool = True) -> None:
-        """A scene of `mesh`; `least` faces, at least, take part in the computation of shadows."""
+    def __init__(self, mesh: Mesh, *, shadows: bool = True) -> None:
+        """A scene of `mesh`; without `shadows` for pictures that are not lit."""
         self.mesh = mesh
-        self.fine = split(mesh, least)
-        self.rays = Rays(self.fine.mesh, embree=embree)
+        self.fine = split(mesh, FINE_FACES if shadows else 0)
+        self.rays = Rays(self.fine.mesh)
         low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
         self.size = float(np.linalg.norm(high - low))
 

@@ -427,12 +427,18 @@ def conformality(contents: Contents) -> Table:
         across=True,
         set_apart=contents.atlases,
         notes=(
-            *(f"{label.short}: {label.text}." for label in contents.methods if label.detail),
+            _legend(contents),
             *method_notes(contents),
             *_published_notes(authors),
             environment_note(contents),
         ),
     )
+
+
+def _legend(contents: Contents) -> str:
+    """What the short names of the methods stand for."""
+    told = [f"{label.short}: {label.detail}" for label in contents.methods if label.detail]
+    return f"Methods. {'; '.join(told)}."
 
 
 def _published_notes(authors: Sequence[str]) -> list[str]:
@@ -729,9 +735,9 @@ def tables(contents: Contents) -> list[Table]:
     """The tables of a suite, the one to read first first."""
     made = [
         conformality(contents),
+        against_published(contents),
         supplement(contents),
         comparison(contents),
-        against_published(contents),
         failures(contents),
     ]
     return [table for table in made if table is not None]

@@ -1,0 +1,95 @@
+import pytest
+
+from parapoint.errors import InputError
+from reports.contents import contents, labels, suite_title
+
+from .conftest import HAND, Writer, flat, sheet
+
+
+def rows(tmp_path, *methods):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for method, params, given in methods:
+            writer.cell(HAND, sheet(), method, params, result=flat(sheet()), **given)
+    return writer.store.rows()
+
+
+def test_labels_name_energy_iterations_and_only_what_differs(tmp_path):
+    one = {"energy": "symmetric_dirichlet", "iterations": 1}
+    found = labels(
+        rows(
+            tmp_path,
+            ("parapoint", {"preset": "fast", "points": None, "lr": 0.1}, {}),
+            ("parapoint", {"preset": "fast", "points": None, "lr": 0.2}, {}),
+            ("slim", {**one, "iterations": 20}, {}),
+            ("slim", one, {}),
+            ("slim", {"energy": "conformal", "iterations": 20}, {}),
+            ("mine", {}, {}),
+            ("lscm", {}, {}),
+        )
+    )
+    assert [label.short for label in found.values()] == [
+        "LSCM",
+        "SLIM symmetric Dirichlet 20 iterations",
+        "SLIM symmetric Dirichlet 1 iteration",
+        "SLIM conformal",
+        "mine",
+        "ParaPoint 0.1 lr",
+        "ParaPoint 0.2 lr",
+    ]
+    assert [label.text for label in found.values()][1] == (
+        "SLIM (symmetric Dirichlet, 20 iterations)"
+    )
+    assert [label.text for label in found.values()][-1] == "ParaPoint (fast, lr 0.2)"
+
+
+def test_a_label_says_what_the_reports_say(tmp_path):
+    params = {"preset": "paper", "iterations": None}
+    found = labels(
+        rows(
+            tmp_path,
+            ("parapoint", params, {"report": {"iterations": 400}}),
+            ("parapoint", params, {"report": {"iterations": 1200}, "seed": 1}),
+        )
+    )
+    assert [label.detail for label in found.values()] == ["paper, 400 to 1,200 iterations"]
+
+
+def test_means_are_over_the_seeds_that_ended_well(tmp_path):
+    rows(
+        tmp_path,
+        ("slim", {}, {"seed": 0, "seconds": 1.0}),
+        ("slim", {}, {"seed": 1, "seconds": 3.0}),
+        ("slim", {}, {"seed": 2, "seconds": 9.0, "status": "failed", "reason": "it broke"}),
+    )
+    record = contents(tmp_path)[0].means.iloc[0]
+    assert (record["ok"], record["tried"], record["skipped"]) == (2, 3, 0)
+    assert record["seconds"] == 2.0
+    assert record["reason"] == "it broke"
+
+
+def test_atlases_are_known_by_their_charts(tmp_path):
+    mesh = sheet()
+    apart = flat(mesh)
+    pieces = type(apart)(apart.uv[apart.corners].reshape(-1, 2), range_corners(len(mesh.faces)))
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        writer.cell(HAND, mesh, "lscm", {}, result=flat(mesh))
+        writer.cell(HAND, mesh, "xatlas", {}, result=pieces)
+    assert contents(tmp_path)[0].atlases == {"xatlas"}
+
+
+def range_corners(count):
+    return [[3 * k, 3 * k + 1, 3 * k + 2] for k in range(count)]
+
+
+def test_missing_and_empty_folders_are_said_in_one_line(tmp_path):
+    with pytest.raises(InputError, match=r"no such folder; `python -m benchmarks run` makes one"):
+        contents(tmp_path / "nowhere")
+    with pytest.raises(InputError, match="holds no results"):
+        contents(tmp_path)
+
+
+def test_titles_of_suites():
+    assert suite_title("paper").startswith("The supplement's comparison")
+    assert suite_title("my own") == "my own"

@@ -1,0 +1,139 @@
+import dataclasses
+import pickle
+
+import numpy as np
+import pytest
+from matplotlib.text import Text
+
+from reports import figures
+from reports.contents import contents
+from reports.figures import draw, drawings, leading, look, plain_log, write
+
+from .conftest import HAND, NEFERTITI, Writer, flat, sheet
+
+
+@pytest.fixture
+def suite(results):
+    return contents(results)[0]
+
+
+def texts(made):
+    return [text.get_text() for text in made.findobj(Text)]
+
+
+def test_every_figure_is_written_with_a_caption(reported):
+    folder = reported / "report" / "figures" / "paper"
+    suite = contents(reported)[0]
+    names = [one.name for one in drawings(suite, folder)]
+    assert names[:2] == ["models", "disks"]
+    assert len(names) == len(set(names))
+    for name in names:
+        assert (folder / f"{name}.pdf").read_bytes().startswith(b"%PDF")
+        assert (folder / f"{name}.png").stat().st_size > 1000
+    captions = (folder / "captions.md").read_text()
+    assert all(f"## {name}\n" in captions for name in names)
+
+
+def test_figures_are_drawn_again_only_when_something_changed(suite, tmp_path, monkeypatch):
+    kept = [one for one in drawings(suite, tmp_path) if one.name in {"pareto", "losses"}]
+    monkeypatch.setattr(figures, "drawings", lambda *_: kept)
+    written = []
+    monkeypatch.setattr(
+        figures, "write", lambda folder, one: (written.append(one.name), write(folder, one))
+    )
+    draw(suite, tmp_path, tmp_path, 1)
+    draw(suite, tmp_path, tmp_path, 1)
+    assert written == ["pareto", "losses"]
+    kept[0] = dataclasses.replace(kept[0], rows=kept[0].rows[:-1])
+    draw(suite, tmp_path, tmp_path, 1)
+    assert written == ["pareto", "losses", "pareto"]
+
+
+def test_the_same_results_give_the_same_bytes(suite, tmp_path):
+    made = next(one for one in drawings(suite, tmp_path) if one.name == "pareto")
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        write(tmp_path / name, made)
+    for kind in ("pdf", "png"):
+        one, two = ((tmp_path / name / f"pareto.{kind}").read_bytes() for name in ("one", "two"))
+        assert one == two
+
+
+def test_the_supplements_figure_shows_slim_isometric_beside_parapoint(suite, tmp_path):
+    assert leading(suite, "slim").short == "SLIM symmetric Dirichlet"
+    found = texts(figures.disks(suite, tmp_path))
+    assert "SLIM: UV" in found
+    assert "ParaPoint: view 2" in found
+    assert not any(NEFERTITI in text for text in found)
+    assert "no picture" in found  # none was drawn here
+
+
+def test_the_closed_models_figure_says_what_cut_it_and_why_a_map_is_missing(suite, tmp_path):
+    found = texts(figures.cut_model(suite, NEFERTITI, tmp_path))
+    assert "skipped" in found
+    assert any(text.startswith("(c) ParaPoint") for text in found)
+
+
+def test_convergence_draws_the_quality_along_the_way(suite):
+    made = figures.convergence(suite)
+    panel = next(place for place in made.axes if place.get_title() == HAND)
+    lines = {line.get_label(): line for line in panel.get_lines()}
+    seconds, angles = lines["SLIM symmetric Dirichlet"].get_data()
+    np.testing.assert_allclose(seconds, [0.1, 1.1, 2.1])
+    assert (np.diff(angles) < 0).all()
+    row = suite.shown(HAND, suite.methods[0])
+    measured = suite.measured.set_index("id").loc[row.id, "angle_difference_mean"]
+    assert angles[-1] == pytest.approx(measured)
+
+
+def test_losses_are_those_of_the_trace(suite):
+    made = figures.losses(suite)
+    assert [place.get_title() for place in made.axes] == [HAND, "mannequin-devil"]
+    lines = {line.get_label(): line for line in made.axes[0].get_lines()}
+    np.testing.assert_allclose(lines["total"].get_ydata(), [1, 1 / 2, 1 / 3])
+
+
+def test_singular_values_of_an_isometry_peak_at_one(tmp_path):
+    mesh = sheet()
+    plane = type(mesh)(mesh.vertices * [1, 1, 0], mesh.faces)
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        writer.cell(HAND, plane, "lscm", {}, result=flat(plane))
+    made = figures.singular_values(contents(tmp_path)[0])
+    first = made.axes[0].get_lines()[0]
+    assert first.get_ydata().max() == pytest.approx(1.0)
+    assert abs(first.get_xdata()[first.get_ydata().argmax()]) < 0.2
+
+
+def test_every_method_looks_different(suite):
+    looks = [tuple(map(str, look(suite, label).values())) for label in suite.methods]
+    assert len(set(looks)) == len(looks)
+
+
+def test_figures_without_anything_to_show_are_left_out(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        writer.cell(HAND, sheet(), "lscm", {}, status="failed", reason="it broke")
+    suite = contents(tmp_path)[0]
+    (tmp_path / "f").mkdir()
+    drawn = draw(suite, tmp_path / "p", tmp_path / "f", 1)
+    assert [one.name for one in drawn] == ["models"]
+
+
+def test_a_figure_can_be_made_in_another_process(suite, tmp_path):
+    for name in ("pareto", "losses"):
+        made = next(one for one in drawings(suite, tmp_path) if one.name == name)
+        other = pickle.loads(pickle.dumps(made))  # noqa: S301 (our own bytes)
+        assert other.figure() is not None
+
+
+def test_log_axes_have_plain_numbers():
+    made = figures.figure(2, 2)
+    place = made.add_subplot()
+    place.plot([1, 2], [0.004, 30])
+    place.set_yscale("log")
+    plain_log(place.yaxis)
+    made.canvas.draw()
+    shown = [label.get_text() for label in place.yaxis.get_ticklabels()]
+    assert "0.01" in shown
+    assert not any("10^" in text for text in shown)

@@ -1,0 +1,149 @@
+import html.parser
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from parapoint import console
+from reports.__main__ import main
+from reports.contents import contents
+from reports.report import write
+
+from .conftest import HAND, Writer, sheet
+
+VOID = {"meta", "img", "br", "link", "input", "hr"}
+
+
+class Page(html.parser.HTMLParser):
+    """Tags that match, addresses, and the text of a page."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.addresses: list[str] = []
+        self.ids: list[str] = []
+        self.text = ""
+
+    def handle_starttag(self, tag, attrs):
+        if tag not in VOID:
+            self.open.append(tag)
+        for name, value in attrs:
+            if name in {"src", "href"}:
+                self.addresses.append(value)
+            if name == "id":
+                self.ids.append(value)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text += data
+
+
+def parsed(path: Path) -> Page:
+    page = Page()
+    page.feed(path.read_text(encoding="utf-8"))
+    assert page.open == []
+    return page
+
+
+def test_the_page_is_whole_opens_from_disk_and_escapes(reported):
+    index = reported / "report" / "index.html"
+    page = parsed(index)
+    source = index.read_text(encoding="utf-8")
+    assert "<script>alert" not in source
+    assert "<script>alert" in page.text
+    for address in page.addresses:
+        assert not re.match(r"(https?:)?//", address)
+        if address.startswith("#"):
+            assert address[1:] in page.ids
+        else:
+            assert (index.parent / address).is_file(), address
+    assert len(page.ids) == len(set(page.ids))
+    assert "over 10 s" in page.text
+    assert "lower (better)" in page.text
+    assert "python -m benchmarks run paper" in page.text
+    # The table comes before any picture.
+    assert source.index("<table") < source.index("<img")
+
+
+def test_every_table_is_there_in_three_formats(reported):
+    folder = reported / "report" / "tables" / "paper"
+    names = {"conformality", "supplement", "comparison", "published", "failures", "cells"}
+    assert {path.stem for path in folder.iterdir()} == names
+    assert all((folder / f"{n}{kind}").exists() for n in names for kind in (".tex", ".md", ".csv"))
+
+
+def test_failed_cells_only_give_a_report_that_says_so(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        writer.cell(HAND, sheet(), "lscm", {}, status="failed", reason="it broke", output="Boom")
+        writer.cell("gone", None, "lscm", {}, status="skipped", reason="not at hand")
+    page = parsed(write(tmp_path, jobs=1))
+    assert "No cell of The supplement's comparison" in page.text
+    assert "it broke" in page.text
+    assert "Boom" in page.text
+    assert "not at hand" in page.text
+
+
+def test_a_half_written_folder_is_reported_without_what_is_lost(results, tmp_path):
+    folder = tmp_path / "half"
+    shutil.copytree(results, folder)
+    runs = folder / "runs.jsonl"
+    content = runs.read_bytes()
+    runs.write_bytes(content[: len(content) - 40])
+    (folder / "environment.json").unlink()
+    shutil.rmtree(folder / "uv")
+    shutil.rmtree(folder / "surfaces")
+    assert len(contents(folder)[0].rows) == content.count(b"\n") - 1
+    page = parsed(write(folder, jobs=1))
+    assert "environment not recorded" in page.text
+    assert "no pictures" in page.text
+
+
+def test_a_user_s_file_and_two_suites(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        row = writer.cell("/home/me/scan_1.obj", sheet(), "mine", {}, status="failed", reason="no")
+        lines = (tmp_path / "runs.jsonl").read_text()
+        other = json.loads(lines) | {"suite": "other", "id": row.id[::-1]}
+    with (tmp_path / "runs.jsonl").open("a") as stream:
+        stream.write(json.dumps(other) + "\n")
+    page = parsed(write(tmp_path, jobs=1))
+    assert {"paper", "other"} <= set(page.ids)
+
+
+@pytest.mark.parametrize("kind", ["missing", "empty", "file", "newer", "damaged"])
+def test_the_command_says_what_is_wrong_in_one_line(tmp_path, capsys, kind):
+    folder = tmp_path / "results"
+    if kind == "file":
+        folder.write_text("x")
+    elif kind != "missing":
+        folder.mkdir()
+    if kind == "newer":
+        (folder / "environment.json").write_text('{"format": 99, "runs": []}')
+    if kind == "damaged":
+        (folder / "runs.jsonl").write_text('{"id": 1}\nnot json\n')
+        (folder / "environment.json").write_text("[")
+    with pytest.raises(SystemExit) as stop:
+        console.run(main, [str(folder)])
+    said = capsys.readouterr().err
+    assert stop.value.code == 2
+    assert said.startswith("error: ")
+    assert said.count("\n") == 1
+    assert str(folder) in said
+    assert not (folder / "report").exists()
+
+
+def test_reports_leave_torch_alone():
+    code = (
+        "import sys, reports.report, reports.__main__; "
+        "bad = [m for m in sys.modules if m == 'torch' or m.startswith('baselines.')]; "
+        "print([m for m in bad if m != 'baselines.registry'])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
