@@ -157,10 +157,10 @@ class Trainer:
         self.precision = usable_precision(preset.precision, device)
         self.networks.train_in(PRECISIONS[self.precision])
         self.optimizer = AdamW(list(self.networks.parameters()), preset.weight_decay)
+        self.device = device
         self.shape = self._prepared(points)
         self.hull = self._prepared(hull_sample(points, len(points), seed))
         self.noise = preset.perturbation * mean_spacing(points)
-        self.device = device
         self.iteration = 0
         self.seconds = 0.0
         self.divergences = 0
@@ -268,7 +268,7 @@ class Trainer:
         rows = points[None]
         if self.preset.unfolding_weight:
             rows = np.concatenate([rows, tangent_frames(points)])
-        return torch.as_tensor(rows, dtype=torch.float32)
+        return torch.as_tensor(rows, dtype=torch.float32, device=self.device)
 
     def _fits(self, seconds: float) -> bool:
         """Whether a step of this length still ends within the time budget."""
@@ -287,7 +287,7 @@ class Trainer:
             grid if self.preset.branches != "3d" else None,
         )
         try:
-            terms = objective_terms(self.preset, cycle, points[0])
+            terms = objective_terms(self.preset, cycle, self._cloud()[0])
         except losses.NotFiniteError:
             return {"total": math.nan}
         total = torch.stack([self.weights[name] * value for name, value in terms.items()]).sum()
@@ -302,19 +302,32 @@ class Trainer:
 
     def _batch(self) -> tuple[Tensor, Tensor]:
         """Perturbed points of the phase (see `_prepared`) and a perturbed lattice (about n, 2)."""
-        cloud = self.hull if self._phase() == "hull" else self.shape
+        cloud = self._cloud()
         size = cloud.shape[1]
         if self._phase() != "all" and self.preset.subset < size:
             size = self.preset.subset
-            cloud = cloud[:, torch.randperm(cloud.shape[1], generator=self.generator)[:size]]
-        noise = torch.zeros_like(cloud)
+            chosen = torch.randperm(cloud.shape[1], generator=self.generator)[:size]
+            cloud = cloud[:, chosen.to(self.device)]
+        noise = torch.zeros(cloud.shape)
         noise[0] = self.noise * torch.randn(size, 3, generator=self.generator)
         grid = lattice(round(math.sqrt(size)), self.generator)
-        return (cloud + noise).to(self.device), grid.to(self.device)
+        return cloud + noise.to(self.device), grid.to(self.device)
+
+    def _cloud(self) -> Tensor:
+        """All points that the phase is fitted to (see `_prepared`)."""
+        return self.hull if self._phase() == "hull" else self.shape
 
 
 def objective_terms(preset: Preset, cycle: Cycle, points: Tensor) -> dict[str, Tensor]:
-    """The unweighted terms of the objective; those of a branch that is left out are missing."""
+    """The unweighted terms of the objective; those of a branch that is left out are missing.
+
+    Args:
+        preset: weights and settings.
+        cycle: both branches.
+        points: (N, 3) all given points. P̂ is held against these also where a sparse subset goes
+            through the networks: against the subset alone the Chamfer distance is mostly sampling
+            noise, in which the terms of weight 0.01 drown.
+    """
     distortion = losses.DISTORTIONS[preset.distortion]
     eigenvalues = losses.EIGENVALUES[preset.eigenvalues]
     terms: dict[str, Tensor] = {}
