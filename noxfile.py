@@ -33,7 +33,16 @@ def types(session: nox.Session) -> None:
 def tests(session: nox.Session) -> None:
     """The test suite: `nox -s tests -- -k cutting` runs a part of it."""
     install(session)
-    session.run("pytest", *session.posargs)
+    # A process a core, each with one thread: libraries that share the cores only wait for each other.
+    session.run(
+        "pytest",
+        "-n",
+        "logical",
+        "--dist",
+        "worksteal",
+        *session.posargs,
+        env={"OMP_NUM_THREADS": "1"},
+    )
 
 
 @nox.session
