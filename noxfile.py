@@ -33,7 +33,7 @@ def types(session: nox.Session) -> None:
 def tests(session: nox.Session) -> None:
     """The test suite: `nox -s tests -- -k cutting` runs a part of it."""
     install(session)
-    # A process a core, each with one thread: libraries that share the cores only wait for each other.
+    # A process a core, each with one thread: more would only wait for each other.
     session.run(
         "pytest",
         "-n",
