@@ -1,5 +1,7 @@
 """The project's commands: `nox` checks it, `nox -s bench` reproduces the tables."""
 
+import os
+
 import nox
 
 nox.options.default_venv_backend = "virtualenv"
@@ -33,7 +35,16 @@ def types(session: nox.Session) -> None:
 def tests(session: nox.Session) -> None:
     """The test suite: `nox -s tests -- -k cutting` runs a part of it."""
     install(session)
-    session.run("pytest", *session.posargs)
+    # A process a core, each with one thread: more would only wait for each other.
+    session.run(
+        "pytest",
+        "-n",
+        "logical",
+        "--dist",
+        "worksteal",
+        *session.posargs,
+        env={"OMP_NUM_THREADS": "1"},
+    )
 
 
 @nox.session
@@ -45,6 +56,8 @@ def bench(session: nox.Session) -> None:
         arguments.insert(0, "paper")
     if "--out" not in arguments:
         arguments += ["--out", f"results/{arguments[0]}"]
+    if "--jobs" not in arguments:  # two cells with a thread each end sooner than one with two
+        arguments += ["--jobs", str(min(os.cpu_count() or 1, 8))]
     session.run("python", "-m", "benchmarks", "run", *arguments)
     session.run("python", "-m", "reports", arguments[arguments.index("--out") + 1])
 

@@ -21,7 +21,8 @@ class Preset:
         branches: "both", or one of the ablations "3d" (3D→2D→3D alone) and "2d".
         points: training points.
         iterations: steps, warm-up included (the text gives none; the group's later code 10,000).
-        subset: points of a step before `all_from`, drawn anew each time (open: "a sparser subset").
+        subset: points that go through the networks in a step before `all_from`, drawn anew each
+            time (open: "a sparser subset"); the Chamfer distance is to all points throughout.
         all_from: share of the run after which each step takes all points (open: "later").
         warm_up: share of the run that goes to the points' convex hull (open).
         perturbation: standard deviation of the noise on points, in mean distances between
@@ -52,7 +53,7 @@ class Preset:
     iterations: int = 10_000
     subset: int = 2_048
     all_from: float = 0.5
-    warm_up: float = 0.25
+    warm_up: float = 0.15
     perturbation: float = 0.1
     unwrap_weight: float = 0.01
     wrap_weight: float = 1.0

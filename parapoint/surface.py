@@ -155,7 +155,7 @@ class Mesh:
 
     @cached_property
     def is_manifold(self) -> bool:
-        """At most two faces at each edge, one fan of faces at each vertex, no vertex twice in one."""
+        """At most two faces at each edge, one fan at each vertex, no vertex twice in a face."""
         repeated = (self.faces == np.roll(self.faces, 1, axis=1)).any()
         if repeated or (self.edge_face_count > 2).any():
             return False

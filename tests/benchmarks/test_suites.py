@@ -23,7 +23,7 @@ def test_cases_and_methods_exist(name):
         assert registry.method(spec)[0] in registry.METHODS
 
 
-def test_the_suites_that_issues_name():
+def test_the_suites():
     expected = {"smoke", "builtin", "paper", "disk", "closed", "genus", "cad", "wild", "scans"}
     assert expected | {"artist", "core", "ablation", "quality"} == set(SUITES)
     assert SUITES["builtin"].cases == tuple(BUILTIN)

@@ -337,7 +337,7 @@ def test_a_time_budget_ends_the_fit() -> None:
 def test_the_report_and_the_trace_say_what_was_done() -> None:
     cloud = PointCloud(paraboloid())
     result = ParaPoint(**TINY).parameterize(cloud, seed=5)
-    expected = {"preset": "paper", "points": 150, "iterations": 6, "device": "cpu", "warm_up": 0.25}
+    expected = {"preset": "paper", "points": 150, "iterations": 6, "device": "cpu", "warm_up": 0.15}
     assert expected.items() <= result.report.items()
     assert result.report["weights"]["wrap"] == presets.PAPER.wrap_weight
     assert [point.iteration for point in result.trace] == [1, 2, 3, 4, 5, 6]
