@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 ENDINGS = (".obj", ".ply", ".npz")
 OPTIONS = (
-    click.option("--preset", default="fast", show_default=True, help="fast or paper."),
+    click.option("--preset", default="fast", show_default=True, help="fast, smooth or paper."),
     click.option("--points", type=int, help="Training points."),
     click.option("--subset", type=int, help="Points of a step, before the last ones take all."),
     click.option("--iterations", type=int, help="Steps."),

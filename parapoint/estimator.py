@@ -22,11 +22,14 @@ import torch
 from scipy.spatial import cKDTree
 from torch import Tensor
 
+from parapoint.anchored import AnchoredNetworks, Anchors
 from parapoint.errors import InputError
+from parapoint.flattening import flat_map
 from parapoint.losses import DISTORTIONS, EIGENVALUES
-from parapoint.networks import ACTIVATIONS, Networks
+from parapoint.networks import ACTIVATIONS, Networks, SubNetworks
 from parapoint.parameterization import Parameterization, PointParameterization, TracePoint
-from parapoint.presets import PRESETS, Preset
+from parapoint.presets import PRESETS, SMOOTH, Preset
+from parapoint.reconstruction import ReconstructionError
 from parapoint.surface import BoolArray, FloatArray, Mesh, PointCloud, Surface
 from parapoint.trainer import PRECISIONS, Step, Trainer, surface_sample
 
@@ -40,6 +43,11 @@ FEWEST_VERTICES = 2_000
 """A mesh of fewer vertices is sampled on its faces instead: its vertices alone do not show it."""
 BATCH = {"cpu": 2_048, "cuda": 65_536}
 """Points mapped at a time: on a CPU the layers of so many stay in its cache."""
+COMPUTED_PER_SECOND = 400
+"""Points of a computed map for each second of the budget: it takes what it takes, at about 2,000
+points a second on one core, so a small budget gets fewer points."""
+COINCIDENT = 1e-6
+"""Points of a computed map that agree to this, in radii of the cloud, count as one."""
 CHECKPOINT_SECONDS = 60.0
 KEPT_MAPS = 8
 """Maps kept in the trace of `parameterize`."""
@@ -75,7 +83,8 @@ class ParaPoint:
         >>> cut = points[model.seams()]                   # the points where the surface is open
 
     Attributes:
-        preset: "paper" or "fast"; `parapoint.presets` has every number of each.
+        preset: "paper", "fast" or "smooth"; `parapoint.presets` has every number of each. With
+            "fast" the map is computed and held by the networks; only Deform is trained.
         points: training points.
         iterations: steps, the warm-up included.
         time_budget: seconds of fitting; the schedule follows the time where that ends sooner.
@@ -90,7 +99,8 @@ class ParaPoint:
         seed: of every random draw.
         device: "auto", "cpu" or "cuda".
         threads: of the processor, None as torch has it.
-        preset_: the numbers of the run, a `Preset`.
+        preset_: the numbers of the run, a `Preset`; those of "smooth" where a map could not be
+            computed for "fast".
         points_: (n, 3) training points.
         networks_: the trained networks.
         centre_, scale_: the points minus `centre_`, over `scale_`, are what the networks see.
@@ -263,7 +273,7 @@ class ParaPoint:
             model = cls(**{**facts["parameters"], "device": device})
             model.preset_ = _preset_from(facts["preset"])
             model.points_ = tensors.pop("points").numpy()
-            model.networks_ = _networks(model.preset_)
+            model.networks_ = _networks(model.preset_, len(tensors.get("cut.anchors", ())))
             model.networks_.load_state_dict(tensors)
             model.centre_ = np.array(facts["centre"])
             model.scale_ = float(facts["scale"])
@@ -280,25 +290,29 @@ class ParaPoint:
         callback: Callable[[Progress], None] | None,
     ) -> Self:
         """`fit`; the trace gets maps of the points `watched`."""
-        preset, device = self._checked()
-        self.preset_ = preset
-        self.points_ = training_points(surface, preset.points, self.seed)
+        self.preset_, device = self._checked()
+        self.points_ = training_points(surface, self._most_points(), self.seed)
         low, high = self.points_.min(axis=0), self.points_.max(axis=0)
         self.centre_ = (low + high) / 2
         self.scale_ = float(np.linalg.norm(self.points_ - self.centre_, axis=1).max())
+        cloud = (self.points_ - self.centre_) / self.scale_
+        begun = time.monotonic()
         with _threads(self.threads):
+            start, found = self._start(cloud) if self.preset_.is_computed else (None, {})
             trainer = Trainer(
-                (self.points_ - self.centre_) / self.scale_,
-                preset,
+                cloud,
+                self.preset_,
                 seed=self.seed,
                 device=device,
                 time_budget=self.time_budget,
+                networks=start,
+                seconds=time.monotonic() - begun,
             )
             self.networks_ = trainer.networks
             self.trace_: tuple[TracePoint, ...] = ()
             store = None if checkpoint is None else _Checkpoint(Path(checkpoint), self._identity())
-            if store is not None and (found := store.read()) is not None:
-                tensors, facts = found
+            if store is not None and (state := store.read()) is not None:
+                tensors, facts = state
                 trainer.resume(tensors, facts["trainer"])
                 self.trace_ = tuple(TracePoint(*row) for row in facts["trace"])
             begun = time.monotonic() - trainer.seconds
@@ -312,10 +326,40 @@ class ParaPoint:
                     callback(Progress(step, left))
         if store is not None:
             store.remove()
-        self.report_ = self._report(trainer, device, time.monotonic() - begun)
+        self.report_ = self._report(trainer, device, time.monotonic() - begun) | found
         if trainer.divergences:
             logger.warning("training diverged once and went on with a smaller step")
         return self
+
+    def _most_points(self) -> int:
+        """Most training points: the preset's, or what a map can be computed of in the budget."""
+        count = self.preset_.points
+        if not self.preset_.is_computed or self.time_budget is None:
+            return count
+        return min(count, max(FEWEST_POINTS, round(COMPUTED_PER_SECOND * self.time_budget)))
+
+    def _start(self, cloud: FloatArray) -> tuple[SubNetworks | None, dict[str, object]]:
+        """Networks that hold a computed map of the cloud, and what the report says of it.
+
+        Where none can be computed they are None, and `preset_` becomes the one that trains.
+        """
+        _, rows = np.unique(np.round(cloud / COINCIDENT), axis=0, return_index=True)
+        cloud = cloud[np.sort(rows)]
+        try:
+            flat = flat_map(cloud)
+        except ReconstructionError as error:
+            logger.warning("no map could be computed, so one is trained: %s", error)
+            self.preset_ = self._with_parameters(SMOOTH)
+            return None, {"map": "trained", "map_not_computed": str(error)}
+        if missing := len(cloud) - len(flat.anchors):
+            logger.warning(
+                "%d of %d points are not on the surface that was found", missing, len(cloud)
+            )
+        networks = _networks(self.preset_, len(flat.anchors), self.seed)
+        assert isinstance(networks, AnchoredNetworks)
+        anchors = Anchors(cloud[flat.anchors], flat.uv, flat.jacobians)
+        networks.hold(anchors, flat.inverse_jacobians)
+        return networks, {"map": "computed", "anchors": len(flat.anchors), "found": flat.facts}
 
     def _record(self, step: Step, watched: FloatArray | None) -> None:
         """Append a step to the trace, with a map of the points watched where one is due."""
@@ -382,9 +426,13 @@ class ParaPoint:
             raise InputError(f"distortion_weight must be a number of at least 0, not {weight}")
         if not isinstance(self.seed, int) or self.seed < 0:
             raise InputError(f"seed must be a whole number of at least 0, not {self.seed}")
+        return self._with_parameters(PRESETS[self.preset]), _device(self.device)
+
+    def _with_parameters(self, preset: Preset) -> Preset:
+        """The preset with this model's parameters in it."""
         own = {field.name for field in dataclasses.fields(Preset)}
         given = {k: v for k, v in self.get_params().items() if k in own and v is not None}
-        return dataclasses.replace(PRESETS[self.preset], **given), _device(self.device)
+        return dataclasses.replace(preset, **given)
 
     def _identity(self) -> str:
         """What a checkpoint must agree on with the run that goes on from it."""
@@ -482,10 +530,13 @@ def _device(name: str) -> str:
     return "cuda" if available and name != "cpu" else "cpu"
 
 
-def _networks(preset: Preset) -> Networks:
-    """Networks of a preset, about to be filled with saved weights."""
-    activation = ACTIVATIONS[preset.activation]
-    return Networks(preset.hidden, preset.embedding, activation, torch.Generator())
+def _networks(preset: Preset, anchors: int, seed: int = 0) -> SubNetworks:
+    """Networks of a preset, about to be filled: with saved weights, or a map at the anchors."""
+    sizes = preset.hidden, preset.embedding, ACTIVATIONS[preset.activation]
+    generator = torch.Generator().manual_seed(seed)
+    if preset.is_computed:
+        return AnchoredNetworks(anchors, *sizes, generator)
+    return Networks(*sizes, generator)
 
 
 def _preset_from(facts: dict[str, Any]) -> Preset:

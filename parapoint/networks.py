@@ -226,22 +226,17 @@ class Cycle(NamedTuple):
     grid: GridBranch | None
 
 
-class Networks(nn.Module):
-    """Deform, Cut, Stitch, Wrap and Unwrap (paper, section 3.2), with the maps made of them."""
+class SubNetworks(nn.Module):
+    """Deform, Cut, Stitch, Wrap and Unwrap, whatever is in them, and the maps made of them.
 
-    def __init__(
-        self,
-        hidden: tuple[int, ...],
-        embedding: int,
-        activation: Activation,
-        generator: torch.Generator,
-    ) -> None:
-        super().__init__()
-        self.deform = OffsetStack(2, embedding, hidden, activation, generator)
-        self.cut = OffsetStack(3, embedding, hidden, activation, generator)
-        self.stitch = Stack(3, 3, hidden, activation, generator)
-        self.wrap = Stack(2, 3, hidden, activation, generator)
-        self.unwrap = Stack(3, 2, hidden, activation, generator)
+    Each maps (1 + T, N, C) points and tangents.
+    """
+
+    deform: nn.Module
+    cut: nn.Module
+    stitch: nn.Module
+    wrap: nn.Module
+    unwrap: nn.Module
 
     def train_in(self, precision: torch.dtype) -> None:
         """Take the products of wide layers in this precision where gradients are asked for."""
@@ -306,7 +301,25 @@ class Networks(nn.Module):
         return points
 
 
-def products(networks: Networks) -> tuple[int, int]:
+class Networks(SubNetworks):
+    """The sub-networks of the paper (section 3.2)."""
+
+    def __init__(
+        self,
+        hidden: tuple[int, ...],
+        embedding: int,
+        activation: Activation,
+        generator: torch.Generator,
+    ) -> None:
+        super().__init__()
+        self.deform = OffsetStack(2, embedding, hidden, activation, generator)
+        self.cut = OffsetStack(3, embedding, hidden, activation, generator)
+        self.stitch = Stack(3, 3, hidden, activation, generator)
+        self.wrap = Stack(2, 3, hidden, activation, generator)
+        self.unwrap = Stack(3, 2, hidden, activation, generator)
+
+
+def products(networks: SubNetworks) -> tuple[int, int]:
     """Multiply-adds for one point of the point branch and one of the grid branch, forward alone.
 
     Tangents count as two more points. A backward pass does twice the work of the forward one.

@@ -16,7 +16,7 @@ from scipy.spatial import ConvexHull, QhullError, cKDTree
 from torch import Tensor
 
 from parapoint import losses
-from parapoint.networks import ACTIVATIONS, Cycle, Networks
+from parapoint.networks import ACTIVATIONS, Cycle, Networks, SubNetworks
 from parapoint.presets import Preset
 from parapoint.surface import FloatArray
 
@@ -135,6 +135,8 @@ class Trainer:
         device: "cpu" or "cuda".
         time_budget: seconds after which the run ends; the schedule follows the time where that
             comes before the preset's number of iterations.
+        networks: what to train, all its parameters; new networks of the preset by default.
+        seconds: time that was spent before, part of the budget.
     """
 
     def __init__(
@@ -145,15 +147,19 @@ class Trainer:
         seed: int,
         device: str,
         time_budget: float | None = None,
+        networks: SubNetworks | None = None,
+        seconds: float = 0.0,
     ) -> None:
         self.preset, self.time_budget = preset, time_budget
         self.generator = torch.Generator().manual_seed(seed)
-        self.networks = Networks(
-            preset.hidden,
-            preset.embedding,
-            ACTIVATIONS[preset.activation],
-            self.generator,
-        ).to(device)
+        if networks is None:
+            networks = Networks(
+                preset.hidden,
+                preset.embedding,
+                ACTIVATIONS[preset.activation],
+                self.generator,
+            )
+        self.networks = networks.to(device)
         self.precision = usable_precision(preset.precision, device)
         self.networks.train_in(PRECISIONS[self.precision])
         self.optimizer = AdamW(list(self.networks.parameters()), preset.weight_decay)
@@ -162,7 +168,7 @@ class Trainer:
         self.hull = self._prepared(hull_sample(points, len(points), seed))
         self.noise = preset.perturbation * mean_spacing(points)
         self.iteration = 0
-        self.seconds = 0.0
+        self.seconds = seconds
         self.divergences = 0
         self._phase_now = ""
         self._lowest = math.inf
@@ -291,8 +297,9 @@ class Trainer:
         except losses.NotFiniteError:
             return {"total": math.nan}
         total = torch.stack([self.weights[name] * value for name, value in terms.items()]).sum()
-        total.backward()  # type: ignore[no-untyped-call]
-        self.optimizer.step(self._learning_rate())
+        if total.requires_grad:  # anchored networks train nothing in the point branch
+            total.backward()  # type: ignore[no-untyped-call]
+            self.optimizer.step(self._learning_rate())
         return {name: value.item() for name, value in {**terms, "total": total}.items()}
 
     def _learning_rate(self) -> float:

@@ -1,6 +1,7 @@
 import json
 import logging
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -205,6 +206,96 @@ def test_a_model_of_another_version_or_a_damaged_one_is_one_line(fitted, tmp_pat
     tensors.write_bytes(tensors.read_bytes()[:100])
     with pytest.raises(InputError, match="damaged"):
         ParaPoint.load(tmp_path)
+
+
+FAST = {"preset": "fast", "iterations": 3, "device": "cpu"}
+
+
+@pytest.fixture(scope="module")
+def computed() -> ParaPoint:
+    return ParaPoint(**FAST).fit(paraboloid())
+
+
+def test_the_fast_map_is_computed_and_its_inverse_undoes_it(computed: ParaPoint) -> None:
+    points = paraboloid()
+    assert computed.report_["map"] == "computed"
+    assert computed.report_["anchors"] == 400
+    assert computed.report_["found"]["boundary_loops"] == 1
+    uv = computed.transform(points)
+    np.testing.assert_allclose(computed.inverse_transform(uv), points, atol=1e-4)
+    # Points between the anchors come back near where they were: 7 is the radius.
+    inner = np.abs(paraboloid(3000)[:, :2] - [10, -5]).max(axis=1) < 6
+    dense = paraboloid(3000)[inner]
+    back = computed.inverse_transform(computed.transform(dense))
+    assert np.linalg.norm(back - dense, axis=1).max() < 0.02 * computed.scale_
+
+
+def test_dense_points_of_a_plane_are_mapped_isometrically() -> None:
+    plane = paraboloid() * [1, 1, 0]
+    model = ParaPoint(**FAST).fit(plane)
+    dense = paraboloid(900)[400:] * [1, 1, 0]
+    uv = model.transform(dense)
+    apart = np.linalg.norm(dense[:, None] - dense, axis=2)
+    np.testing.assert_allclose(np.linalg.norm(uv[:, None] - uv, axis=2), apart, atol=1e-4)
+
+
+def test_training_after_the_start_leaves_the_fast_map_as_it_is(computed: ParaPoint) -> None:
+    longer = ParaPoint(**{**FAST, "iterations": 9}).fit(paraboloid())
+    assert np.array_equal(longer.transform(paraboloid()), computed.transform(paraboloid()))
+    uv = computed.transform(paraboloid())
+    assert np.array_equal(longer.inverse_transform(uv), computed.inverse_transform(uv))
+    deform = longer.networks_.deform.embed.layers[0]
+    assert not torch.equal(deform, computed.networks_.deform.embed.layers[0])
+    assert longer.trace_[-1].iteration == 9
+
+
+def test_a_saved_fast_model_maps_as_before(computed: ParaPoint, tmp_path) -> None:
+    computed.save(tmp_path)
+    loaded = ParaPoint.load(tmp_path, device="cpu")
+    dense = paraboloid(700)
+    assert np.array_equal(loaded.transform(dense), computed.transform(dense))
+    uv = computed.transform(dense)
+    assert np.array_equal(loaded.inverse_transform(uv), computed.inverse_transform(uv))
+    assert loaded.report_ == json.loads(json.dumps(computed.report_))
+
+
+def test_a_cloud_that_shows_no_surface_is_trained_instead_and_says_so(caplog) -> None:
+    parts = [paraboloid(150) + np.array([100.0 * k, 0, 0]) for k in range(3)]
+    with caplog.at_level(logging.WARNING, logger="parapoint"):
+        model = ParaPoint(**{**FAST, "iterations": 2}).fit(np.concatenate(parts))
+    assert "one is trained: the largest component holds 150 of 450" in caplog.text
+    assert model.report_["map"] == "trained"
+    assert "150 of 450" in model.report_["map_not_computed"]
+    assert model.preset_ == replace(PRESETS["smooth"], iterations=2)
+    assert isinstance(model.networks_, Networks)
+
+
+def test_points_off_the_surface_are_counted_and_mapped(caplog) -> None:
+    points = np.concatenate([paraboloid(), paraboloid(100) + np.array([500.0, 0, 0])])
+    with caplog.at_level(logging.WARNING, logger="parapoint"):
+        model = ParaPoint(**FAST).fit(points)
+    assert "100 of 500 points are not on the surface that was found" in caplog.text
+    assert np.isfinite(model.transform(points)).all()
+
+
+def test_points_that_nearly_coincide_count_once() -> None:
+    points = paraboloid()
+    noise = 1e-9 * np.random.default_rng(1).normal(size=points.shape)
+    model = ParaPoint(**FAST).fit(np.concatenate([points, points + noise]))
+    assert model.report_["map"] == "computed"
+    assert 400 <= model.report_["anchors"] <= 402  # a pair may lie on two sides of a rounding
+
+
+def test_a_small_budget_gets_fewer_computed_points() -> None:
+    model = ParaPoint(**{**FAST, "time_budget": 0.5}).fit(paraboloid())
+    assert model.report_["points"] == 200
+    assert model.report_["map"] == "computed"
+
+
+@pytest.mark.parametrize("branches", ["3d", "2d"])
+def test_the_branches_of_a_computed_map_can_be_left_out(branches: str) -> None:
+    model = ParaPoint(**FAST, branches=branches).fit(paraboloid())
+    assert model.report_["iterations"] == 3
 
 
 class KilledError(Exception):

@@ -1,0 +1,448 @@
+"""A nearly conformal map of a bare cloud with short seams, computed: the `fast` preset starts here.
+
+The cloud is triangulated, cut, and flattened by two linear solves: one for the scale of the map,
+one for the map of that scale. The cuts lead to where the scale is most extreme (as in Sawhney and
+Crane 2017, "Boundary first flattening", section 6), and are as long as an even scale needs.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import igl
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+from scipy.sparse.linalg import splu
+
+from parapoint.cutting import cut_along, cut_to_disk
+from parapoint.reconstruction import ReconstructionError, triangulation
+from parapoint.surface import FloatArray, IntArray, Mesh
+
+AREA_DISCREPANCY = 0.6
+"""Cuts are added until the predicted total area discrepancy is this small."""
+OPEN_SEAM, CLOSED_SEAM = 0.022, 0.037
+"""Most seam edges, as a fraction of the faces, on surfaces with and without boundary."""
+TIPS = 3
+"""Extremal points that are tried as the tip of each cut."""
+COTANGENTS = (0.02, 20.0)
+"""Range of the edge weights of a Laplacian: positive, for the maximum principle."""
+FLATTEST = 0.02
+"""Least height of a triangle in its longest edges."""
+MOST_FLIPPED = 0.005
+"""With a larger share of flipped triangles least squares conformal maps are tried."""
+LONELY = 6.0
+"""Cost of a vertex most of whose edges cross the seam, in such edges' share."""
+SWEEPS = 10
+"""Passes over the seam in the choice of sides."""
+LEAST_PART = 0.5
+"""Share of the points that the triangulation must reach."""
+
+
+class FlatMap(NamedTuple):
+    """A map at A anchors, the points of the cloud that the triangulation reached.
+
+    Attributes:
+        anchors: (A,) rows of the cloud.
+        uv: (A, 2) images; the map keeps the total area.
+        jacobians: (A, 2, 3) d uv / d x.
+        inverse_jacobians: (A, 3, 2) d x / d uv.
+        facts: what was found, for reports: genus and boundary loops of the triangulation, faces,
+            seam edges, share of flipped triangles.
+    """
+
+    anchors: IntArray
+    uv: FloatArray
+    jacobians: FloatArray
+    inverse_jacobians: FloatArray
+    facts: dict[str, Any]
+
+
+def flat_map(points: FloatArray) -> FlatMap:
+    """A nearly conformal map of distinct points (N, 3).
+
+    Raises:
+        ReconstructionError: the points show no surface that can be followed and flattened.
+    """
+    mesh = triangulation(points)
+    reached = np.flatnonzero(mesh.referenced)
+    if len(reached) < LEAST_PART * len(points):
+        raise ReconstructionError(
+            f"the largest component holds {len(reached)} of {len(points)} points"
+        )
+    row = np.full(len(points), -1, dtype=np.int64)
+    row[reached] = np.arange(len(reached))
+    mesh = Mesh(points[reached], row[mesh.faces])
+    try:
+        disk = _seamed(mesh)
+        uv = _layout(disk)
+    except (RuntimeError, np.linalg.LinAlgError) as error:  # a singular factor
+        raise ReconstructionError(f"the triangulation has no flat map ({error})") from None
+    if not np.isfinite(uv).all():
+        raise ReconstructionError("the triangulation has no flat map (it is not finite)")
+    uv -= (uv.max(axis=0) + uv.min(axis=0)) / 2
+    uv *= np.sqrt(disk.face_areas.sum() / np.abs(_signed_areas(uv, disk.faces)).sum())
+    chosen = _chosen_copies(disk, _origin(mesh, disk))
+    jacobians = _vertex_jacobians(disk, uv)[chosen]
+    boundary = [int((of.edge_face_count == 1).sum()) for of in (mesh, disk)]
+    facts = {
+        "genus": mesh.genus,
+        "boundary_loops": len(mesh.boundary_loops),
+        "faces": len(mesh.faces),
+        "seam_edges": (boundary[1] - boundary[0]) // 2,
+        "flipped": float((_signed_areas(uv, disk.faces) <= 0).mean()),
+    }
+    inverse: FloatArray = np.asarray(np.linalg.pinv(jacobians, rcond=0.1), dtype=np.float64)
+    return FlatMap(reached, uv[chosen], jacobians, inverse, facts)
+
+
+def _seamed(mesh: Mesh) -> Mesh:
+    """The mesh cut to a planar domain whose flat map has the scale that is asked for."""
+    share = OPEN_SEAM if mesh.boundary_loops else CLOSED_SEAM
+    budget = int(share * len(mesh.faces))
+    opened = mesh
+    if mesh.genus > 0 or not mesh.boundary_loops:
+        opened = cut_to_disk(mesh)
+    opened = _joined_loops(opened)
+    return _scale_cuts(opened, budget - (len(opened.vertices) - len(mesh.vertices)))
+
+
+def _origin(mesh: Mesh, cut: Mesh) -> IntArray:
+    """(M,) the vertex of `mesh` that each one of `cut` is or copies."""
+    origin = np.empty(len(cut.vertices), dtype=np.int64)
+    origin[cut.faces] = mesh.faces
+    return origin
+
+
+def _graph(mesh: Mesh) -> sparse.csr_matrix:
+    """The symmetric (V, V) graph of the edges; their lengths plus the mean, so few are best."""
+    i, j = mesh.edges.T
+    length = np.linalg.norm(mesh.vertices[i] - mesh.vertices[j], axis=1)
+    upper = sparse.coo_matrix((length + length.mean(), (i, j)), (len(mesh.vertices),) * 2)
+    return (upper + upper.T).tocsr()
+
+
+def _inner_edges(mesh: Mesh) -> tuple[IntArray, IntArray]:
+    """(E, 2) the two halfedges at each inner edge, and (E, 2) their faces."""
+    order = np.argsort(mesh.edge_of_halfedge, kind="stable")
+    edge = mesh.edge_of_halfedge[order]
+    first = np.flatnonzero(edge[1:] == edge[:-1])
+    halfedges = np.stack([order[first], order[first + 1]], axis=1)
+    return halfedges, halfedges // 3
+
+
+def _path(previous: IntArray, vertex: int) -> IntArray:
+    """(n, 2) edges from `vertex` back to the root of its tree in `previous`."""
+    path = [vertex]
+    while previous[path[-1]] >= 0:
+        path.append(int(previous[path[-1]]))
+    return np.stack([path[:-1], path[1:]], axis=1).astype(np.int64)
+
+
+def _joined_loops(mesh: Mesh) -> Mesh:
+    """The planar domain cut between the boundary loops that a flat planar map cannot have.
+
+    In the flat metric an inner loop turns by −2π; one that turns otherwise, such as the end of a
+    tube, is joined to the nearest other loop.
+    """
+    while len(loops := mesh.boundary_loops) > 1:
+        turning = _turning(mesh, _log_scale(mesh, flat_loops=False))
+        wrong = np.abs(turning + 2 * np.pi)
+        wrong[turning.argmax()] = 0
+        worst = int(wrong.argmax())
+        if wrong[worst] < np.pi:
+            break
+        distance, previous, _ = csgraph.dijkstra(
+            _graph(mesh), indices=loops[worst], return_predecessors=True, min_only=True
+        )
+        others = np.concatenate([loop for i, loop in enumerate(loops) if i != worst])
+        mesh = cut_along(mesh, _path(previous, int(others[distance[others].argmin()])))
+    return mesh
+
+
+def _scale_cuts(mesh: Mesh, budget: int) -> Mesh:
+    """The planar domain cut from its boundary to where the scale is most extreme.
+
+    Of some tips the one with the largest gain for each cut edge is taken, until the area
+    discrepancy is small enough or `budget` edges are cut.
+    """
+    scale = _log_scale(mesh)
+    discrepancy = _area_discrepancy(mesh, scale)
+    while discrepancy > AREA_DISCREPANCY:
+        graph = _graph(mesh)
+        distance, previous, _ = csgraph.dijkstra(
+            graph,
+            indices=np.concatenate(mesh.boundary_loops),
+            return_predecessors=True,
+            min_only=True,
+        )
+        candidates = []
+        blocked = np.zeros(len(scale), dtype=bool)
+        for _ in range(TIPS):
+            tip = int(np.where(blocked, -1.0, np.abs(scale)).argmax())
+            blocked |= np.isfinite(csgraph.dijkstra(graph, indices=tip, limit=distance[tip] / 2))
+            path = _path(previous, tip)
+            if not 0 < len(path) <= budget:
+                continue
+            cut = cut_along(mesh, path)
+            new_scale = _log_scale(cut)
+            new_discrepancy = _area_discrepancy(cut, new_scale)
+            gain = (discrepancy - new_discrepancy) / len(path)
+            candidates.append((gain, len(path), cut, new_scale, new_discrepancy))
+        if not candidates:
+            break
+        gain, length, cut, new_scale, new_discrepancy = max(candidates, key=lambda row: row[0])
+        if gain <= 0:
+            break
+        mesh, scale, discrepancy, budget = cut, new_scale, new_discrepancy, budget - length
+    return mesh
+
+
+def _laplacian(mesh: Mesh) -> sparse.csc_matrix:
+    """(V, V) positive cotangent Laplacian, its edge weights kept within COTANGENTS."""
+    rows, columns, halves = [], [], []
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        at, left, right = (mesh.faces[:, n] for n in (i, j, k))
+        a, b = (mesh.vertices[end] - mesh.vertices[at] for end in (left, right))
+        area = np.linalg.norm(np.cross(a, b), axis=1)
+        cotangent = np.clip((a * b).sum(axis=1) / np.maximum(area, 1e-300), -1e6, 1e6)
+        rows += [left, right]
+        columns += [right, left]
+        halves += [cotangent / 2] * 2
+    entries = np.concatenate(halves), (np.concatenate(rows), np.concatenate(columns))
+    weight = sparse.coo_matrix(entries, (len(mesh.vertices),) * 2).tocsc()
+    weight.data = np.clip(weight.data, *COTANGENTS)
+    return (sparse.diags_array(np.asarray(weight.sum(axis=1)).reshape(-1)) - weight).tocsc()
+
+
+def _factor(matrix: sparse.csc_matrix) -> Any:
+    """The factors of a symmetric positive definite matrix."""
+    options = {"SymmetricMode": True}
+    return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+
+
+def _curvature(mesh: Mesh) -> FloatArray:
+    """(V,) angle defect at inner vertices, turning angle at those of the boundary."""
+    angles = igl.internal_angles(mesh.vertices, mesh.faces)
+    total = np.bincount(mesh.faces.reshape(-1), np.nan_to_num(angles).reshape(-1))
+    flat = np.full(len(total), 2 * np.pi)
+    flat[np.concatenate(mesh.boundary_loops)] = np.pi
+    return np.asarray(flat - total)
+
+
+def _turning(mesh: Mesh, scale: FloatArray) -> FloatArray:
+    """(loops,) angle by which each boundary loop turns in the metric of a log scale (V,)."""
+    bend = _curvature(mesh) + _laplacian(mesh) @ scale
+    return np.array([bend[loop].sum() for loop in mesh.boundary_loops])
+
+
+def _log_scale(mesh: Mesh, *, flat_loops: bool = True) -> FloatArray:
+    """(V,) log scale of the conformal map of a planar domain that distorts area least.
+
+    It solves Δu = −(angle defect), with u = 0 on the boundary (Springborn, Schröder and Pinkall
+    2008, section 5). With `flat_loops` it is a constant on each inner loop instead, such that the
+    loop turns by −2π, as in the plane.
+    """
+    loops = mesh.boundary_loops
+    boundary = np.concatenate(loops)
+    inside = np.setdiff1d(np.arange(len(mesh.vertices)), boundary)
+    scale = np.zeros(len(mesh.vertices))
+    if len(inside) == 0:
+        return scale
+    matrix = _laplacian(mesh)
+    factor = _factor(matrix[inside][:, inside])
+    scale[inside] = factor.solve(-_curvature(mesh)[inside])
+    if not flat_loops or len(loops) == 1:
+        return scale
+    turning = _turning(mesh, scale)
+    inner = np.delete(np.arange(len(loops)), turning.argmax())
+    unit = np.zeros((len(scale), len(inner)))
+    for column, loop in enumerate(inner):
+        unit[loops[loop], column] = 1
+    unit[inside] = factor.solve(-(matrix[inside][:, boundary] @ unit[boundary]))
+    flux = matrix @ unit
+    response = np.array([flux[loops[loop]].sum(axis=0) for loop in inner])
+    return np.asarray(scale + unit @ np.linalg.solve(response, -2 * np.pi - turning[inner]))
+
+
+def _area_discrepancy(mesh: Mesh, scale: FloatArray) -> float:
+    """Σ |share of the mapped area − share of the area| over the faces, predicted from the scale."""
+    mapped = mesh.face_areas * np.exp(2 * np.clip(scale[mesh.faces].mean(axis=1), -30, 30))
+    return float(np.abs(mapped / mapped.sum() - mesh.face_areas / mesh.face_areas.sum()).sum())
+
+
+def _layout(mesh: Mesh) -> FloatArray:
+    """(V, 2) a flat map of a planar domain."""
+    uv = _scaled_layout(mesh, _log_scale(mesh))
+    flipped = (_signed_areas(uv, mesh.faces) <= 0).mean()
+    if flipped > MOST_FLIPPED:
+        loop = mesh.boundary_loops[0]
+        pins = loop[[0, len(loop) // 2]]
+        try:
+            other = igl.lscm(mesh.vertices, mesh.faces, pins, np.array([[0.0, 0.0], [1.0, 0.0]]))[0]
+        except RuntimeError:  # degenerate triangles
+            return uv
+        if np.isfinite(other).all() and (_signed_areas(other, mesh.faces) <= 0).mean() < flipped:
+            return np.array(other)
+    return uv
+
+
+def _scaled_layout(mesh: Mesh, scale: FloatArray) -> FloatArray:
+    """(V, 2) the map whose log scale is nearest to (V,) one that flattens the mesh.
+
+    The triangles of the scaled edge lengths are turned alike by parallel transport; a Poisson
+    solve makes a map of them (as Sawhney and Crane 2017 with the boundary's lengths given).
+    """
+    faces, count = mesh.faces, len(mesh.faces)
+    stretch = np.exp(np.clip(scale, -5, 5))
+    ends = mesh.vertices[mesh.halfedges]
+    length = np.maximum(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1), 1e-9)
+    length = (length * np.sqrt(stretch[mesh.halfedges].prod(axis=1))).reshape(-1, 3)
+    halfedges, sides = _inner_edges(mesh)
+    heading = _headings(length)
+    turn = heading[halfedges[:, 0]] - heading[halfedges[:, 1]] - np.pi
+    broken = 2.001 * length.max(axis=1) > length.sum(axis=1)  # no triangle has such sides
+    distrust = np.where(broken[sides].any(axis=1), 1000.0, 1.0)
+    angle = _transported(count, sides, turn, distrust, int((~broken).argmax()))
+    cosine, sine = np.cos(angle), np.sin(angle)
+    rotation = np.stack([cosine, -sine, sine, cosine], axis=1).reshape(-1, 2, 2)
+
+    frames, area = _rest_frames(mesh)
+    gradients = np.concatenate([-frames.sum(axis=1, keepdims=True), frames], axis=1)  # (F, 3, 2)
+    size = stretch[faces].prod(axis=1) ** (1 / 3)
+    weight = area / size**2  # errors count relative to the scale
+    blocks = weight[:, None, None] * (gradients @ gradients.transpose(0, 2, 1))
+    places = np.repeat(faces, 3, axis=1).reshape(-1), np.tile(faces, (1, 3)).reshape(-1)
+    matrix = sparse.coo_matrix((blocks.reshape(-1), places), (len(scale),) * 2).tocsc()
+    pull = (weight * size)[:, None, None] * (gradients @ rotation.transpose(0, 2, 1))
+    right = [np.bincount(faces.reshape(-1), pull[:, :, k].reshape(-1)) for k in range(2)]
+    # The map is free to move: one vertex is held.
+    uv: FloatArray = np.zeros((len(scale), 2))
+    uv[1:] = _factor(matrix[1:][:, 1:]).solve(np.stack(right, axis=1)[1:])
+    return uv
+
+
+def _headings(length: FloatArray) -> FloatArray:
+    """(3F,) direction of each halfedge of triangles with sides (F, 3), the first along x."""
+
+    def angle(a: FloatArray, b: FloatArray, opposite: FloatArray) -> FloatArray:
+        return np.arccos(np.clip((a**2 + b**2 - opposite**2) / (2 * a * b), -1, 1))
+
+    one, two, three = length.T
+    at_first, at_second = angle(one, three, two), angle(one, two, three)
+    return np.stack([0 * one, np.pi - at_second, np.pi + at_first], axis=1).reshape(-1)
+
+
+def _transported(
+    count: int, sides: IntArray, turn: FloatArray, distrust: FloatArray, root: int
+) -> FloatArray:
+    """(count,) angles of the faces, of which those at each inner edge differ by `turn` (E,).
+
+    They agree along a tree from `root`; the gaps left at the other edges (a scale flattens a mesh
+    only nearly) are spread by least squares.
+    """
+    shape = (count, count)
+    graph = sparse.coo_matrix((distrust, tuple(sides.T)), shape).tocsr()
+    distance, parent = csgraph.dijkstra(
+        graph, directed=False, indices=root, return_predecessors=True
+    )
+    order = np.argsort(distance, kind="stable")[1:]
+    both = np.concatenate([sides, sides[:, ::-1]]).T
+    turns = sparse.coo_matrix((np.concatenate([turn, -turn]), tuple(both)), shape).tocsr()
+    steps = np.asarray(turns[parent[order], order]).reshape(-1)
+    angle = np.zeros(count)
+    for face, before, step in zip(order, parent[order], steps, strict=True):
+        angle[face] = angle[before] + step
+    gap = turn - (angle[sides[:, 1]] - angle[sides[:, 0]])
+    gap -= 2 * np.pi * np.round(gap / (2 * np.pi))
+    rows = np.repeat(np.arange(len(sides)), 2)
+    signs = np.tile([-1.0, 1.0], len(sides))
+    difference = sparse.coo_matrix((signs, (rows, sides.reshape(-1))), (len(sides), count)).tocsc()
+    trust = sparse.diags_array(1 / distrust)
+    normal = (difference.T @ trust @ difference).tocsc() + 1e-9 * sparse.eye_array(count)
+    return np.asarray(angle + _factor(normal).solve(difference.T @ (trust @ gap)))
+
+
+def _rest_frames(mesh: Mesh) -> tuple[FloatArray, FloatArray]:
+    """(F, 2, 2) inverse edge matrices of the faces in their own planes, and (F,) areas.
+
+    Slivers are thickened to FLATTEST.
+    """
+    corners = mesh.vertices[mesh.faces]
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    length = np.maximum(np.linalg.norm(a, axis=1), 1e-12)
+    along = (a * b).sum(axis=1) / length
+    across = np.linalg.norm(np.cross(a, b), axis=1) / length
+    across = np.maximum(across, FLATTEST * np.maximum(length, np.linalg.norm(b, axis=1)))
+    frames = np.zeros((len(corners), 2, 2))
+    frames[:, 0, 0], frames[:, 0, 1] = 1 / length, -along / (length * across)
+    frames[:, 1, 1] = 1 / across
+    return frames, length * across / 2
+
+
+def _signed_areas(uv: FloatArray, faces: IntArray) -> FloatArray:
+    """(F,) signed areas of triangles in the plane."""
+    a, b = uv[faces[:, 1]] - uv[faces[:, 0]], uv[faces[:, 2]] - uv[faces[:, 0]]
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
+
+
+def _vertex_jacobians(mesh: Mesh, uv: FloatArray) -> FloatArray:
+    """(V, 2, 3) d uv / d x: means of the affine maps of the faces around, weighted by area."""
+
+    def edges(values: FloatArray) -> FloatArray:
+        corners = values[mesh.faces]
+        return np.stack([corners[:, k] - corners[:, 0] for k in (1, 2)], axis=2)
+
+    weight = mesh.face_areas
+    by_face = weight[:, None, None] * (edges(uv) @ np.linalg.pinv(edges(mesh.vertices), rcond=1e-3))
+    total = np.bincount(mesh.faces.reshape(-1), np.repeat(weight, 3), len(uv))
+    jacobians = np.zeros((len(uv), 2, 3))
+    for corner in mesh.faces.T:
+        np.add.at(jacobians, corner, by_face)
+    return jacobians / np.maximum(total, 1e-300)[:, None, None]
+
+
+def _chosen_copies(disk: Mesh, origin: IntArray) -> IntArray:
+    """(N,) the one vertex of `disk` that stands for each of the N uncut ones, `origin` (M,).
+
+    A point on the seam goes to one of its sides. By coordinate descent on the share of edges that
+    bridge the seam, and LONELY times what it exceeds a half at any vertex, so that the seam runs
+    between two rows of points without notches.
+    """
+    chosen = np.empty(int(origin.max()) + 1, dtype=np.int64)
+    chosen[origin] = np.arange(len(origin))
+    for loop in disk.boundary_loops:  # begin with one whole side of each cut
+        chosen[origin[loop]] = loop
+    links = np.concatenate([disk.edges, disk.edges[:, ::-1]])
+    is_copied = np.bincount(origin)[origin] > 1
+    near = np.zeros(len(chosen), dtype=bool)
+    near[origin[is_copied]] = True
+    near[origin[links[is_copied[links[:, 1]], 0]]] = True
+    linked: set[tuple[int, int]] = set()
+    ring: dict[int, set[int]] = {}
+    for i, j in links[near[origin[links[:, 0]]]].tolist():
+        linked.add((i, j))
+        ring.setdefault(int(origin[i]), set()).add(int(origin[j]))
+    copies: dict[int, list[int]] = {}
+    for copy in np.flatnonzero(is_copied).tolist():
+        copies.setdefault(int(origin[copy]), []).append(copy)
+    side: list[int] = chosen.tolist()
+
+    def cost(vertex: int) -> float:
+        bridging = [(side[vertex], side[other]) not in linked for other in ring[vertex]]
+        share = sum(bridging) / len(bridging)
+        return share + LONELY * max(0.0, share - 0.5)
+
+    for _ in range(SWEEPS):
+        before = list(side)
+        for vertex, group in copies.items():
+            around = [vertex, *(other for other in ring[vertex] if other in ring)]
+            present, costs = side[vertex], {}
+            for copy in group:
+                side[vertex] = copy
+                costs[copy] = sum(cost(other) for other in around)
+            best = min(group, key=costs.__getitem__)
+            side[vertex] = best if costs[best] < costs[present] - 1e-9 else present
+        if side == before:
+            break
+    return np.array(side)

@@ -1,0 +1,290 @@
+"""An oriented triangulation of a bare cloud, grown over its Delaunay triangles.
+
+After Cohen-Steiner and Da 2004 ("A greedy Delaunay-based surface reconstruction algorithm"): of the
+triangles of the 3D Delaunay complex those with small empty balls are candidates, and a front takes
+them one by one, the smoothest and smallest first. It only closes up on itself once nothing else is
+left to take, which keeps noise from growing handles.
+"""
+
+from __future__ import annotations
+
+import heapq
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+from scipy.spatial import Delaunay, QhullError, cKDTree
+
+from parapoint.surface import FloatArray, IntArray, Mesh, edge_table
+
+Vector = tuple[float, float, float]
+
+JOGGLE = 1e-4
+"""Noise on the points that the Delaunay complex sees, in spacings: it breaks ties."""
+LOOSEST = 2.5
+"""Largest empty ball of a candidate triangle, in spacings."""
+BEND_COSTS = (15.0, 2.0)
+"""A front takes triangles by size times (1 + cost (1 − cosine of the bend)); each is tried."""
+SHARPEST = -0.8
+"""Least cosine between the normals of neighbouring triangles."""
+GLUE = 0.3
+"""Least cosine between a triangle's normal and that of a vertex where the front meets itself."""
+LONGEST_HOLE = 12
+"""Edges of the largest hole that is filled."""
+HANDLE = 30
+"""A handle counts as so many boundary edges or unused points where two fronts are compared."""
+
+
+class ReconstructionError(RuntimeError):
+    """The cloud shows no surface that can be followed; the message says why."""
+
+
+def triangulation(points: FloatArray) -> Mesh:
+    """The largest component of a manifold, oriented triangulation of distinct points (N, 3).
+
+    The vertices are the points, in order; those in no face are not on the component.
+
+    Raises:
+        ReconstructionError: there are no candidate triangles.
+    """
+    spacing = cKDTree(points).query(points, 7)[0][:, 1:].mean(axis=1)
+    triangles, radius = delaunay_triangles(points, spacing)
+    near = radius < LOOSEST * spacing[triangles].max(axis=1)
+    if not near.any():
+        raise ReconstructionError("no two neighbouring points span a triangle with a third")
+    fronts = [_Front(points, triangles[near], radius[near], cost) for cost in BEND_COSTS]
+    return min((_largest_part(points, front.grown()) for front in fronts), key=_defects)
+
+
+def delaunay_triangles(points: FloatArray, spacing: FloatArray) -> tuple[IntArray, FloatArray]:
+    """The triangles (T, 3) of the Delaunay complex of points (N, 3), and their radii (T,).
+
+    A radius is that of the smallest ball through the corners with no point inside. Far corners of
+    a box keep a plane three-dimensional.
+
+    Raises:
+        ReconstructionError: Qhull gives up.
+    """
+    rng = np.random.default_rng(0)
+    centre, reach = (points.max(axis=0) + points.min(axis=0)) / 2, np.ptp(points, axis=0).max()
+    corner_signs = 2 * np.indices((2, 2, 2)).reshape(3, -1).T - 1
+    box = 3 * reach * (corner_signs + rng.uniform(-0.1, 0.1, (8, 3)))
+    noise = JOGGLE * spacing[:, None] * rng.standard_normal(points.shape)
+    sites = np.concatenate([points + noise - centre, box])
+    try:
+        complex_ = Delaunay(sites)
+    except QhullError as error:
+        raise ReconstructionError(f"Qhull: {str(error).splitlines()[0]}") from None
+    tetrahedra, centres = complex_.simplices, _circumcentres(sites[complex_.simplices])
+    rows, one, two = [], [], []
+    for opposite in range(4):
+        other = complex_.neighbors[:, opposite]
+        once = other > np.arange(len(tetrahedra))  # -1 outside the box
+        rows.append(np.delete(tetrahedra[once], opposite, axis=1))
+        one.append(centres[once])
+        two.append(centres[other[once]])
+    triangles = np.sort(np.concatenate(rows), axis=1).astype(np.int64)
+    inside = (triangles < len(points)).all(axis=1)
+    triangles = triangles[inside]
+    ends = np.concatenate(one)[inside], np.concatenate(two)[inside]
+    return triangles, _empty_radii(sites[triangles], *ends)
+
+
+def _circumcentres(corners: FloatArray) -> FloatArray:
+    """(T, 3) centres of the balls through the corners (T, 4, 3) of tetrahedra."""
+    a, b, c = (corners[:, k] - corners[:, 0] for k in (1, 2, 3))
+    half = [(edge**2).sum(axis=1, keepdims=True) / 2 for edge in (a, b, c)]
+    dual = half[0] * np.cross(b, c) + half[1] * np.cross(c, a) + half[2] * np.cross(a, b)
+    volume = (a * np.cross(b, c)).sum(axis=1, keepdims=True)
+    return np.asarray(corners[:, 0] + dual / np.where(volume == 0, 1e-300, volume))
+
+
+def _empty_radii(corners: FloatArray, one: FloatArray, two: FloatArray) -> FloatArray:
+    """(T,) radii of the smallest empty balls through the corners (T, 3, 3) of triangles.
+
+    Their centres lie on the dual edges between `one` and `two` (T, 3): at the circumcentre if the
+    edge crosses the triangle's plane, else at the nearer end.
+    """
+    a, b, c = (corners[:, k] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    sides = np.prod([np.linalg.norm(p - q, axis=1) for p, q in ((a, b), (b, c), (c, a))], axis=0)
+    circumradius = sides / np.maximum(2 * np.linalg.norm(normal, axis=1), 1e-300)
+    heights = [((end - a) * normal).sum(axis=1) for end in (one, two)]
+    crosses = np.sign(heights[0]) * np.sign(heights[1]) <= 0
+    nearer = np.minimum(np.linalg.norm(one - a, axis=1), np.linalg.norm(two - a, axis=1))
+    return np.asarray(np.where(crosses, circumradius, nearer))
+
+
+class _Front:
+    """Oriented triangles grown from seeds, over candidate triangles (T, 3) with radii (T,).
+
+    A directed edge from i to j is the integer i · N + j; plain Python numbers, as it goes one
+    triangle at a time.
+    """
+
+    def __init__(
+        self, points: FloatArray, triangles: IntArray, radius: FloatArray, bend_cost: float
+    ) -> None:
+        self.size, self.bend_cost = len(points), bend_cost
+        a, b, c = (points[triangles[:, k]] for k in range(3))
+        normals = np.cross(b - a, c - a)
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+        self.seeds: list[int] = np.argsort(radius, kind="stable").tolist()
+        self.corners: list[list[int]] = triangles.tolist()
+        self.radii: list[float] = radius.tolist()
+        self.normals: list[Vector] = [(x, y, z) for x, y, z in normals.tolist()]
+        self.candidates: dict[int, list[int]] = {}
+        for row, (i, j, k) in enumerate(self.corners):
+            for key in (i * self.size + j, j * self.size + k, i * self.size + k):
+                self.candidates.setdefault(key, []).append(row)
+        self.open: dict[int, Vector] = {}  # edge of the front: normal of the triangle on its left
+        self.closed: set[int] = set()  # edges with both triangles, in either direction
+        self.leaving = [0] * self.size  # edges of the front that start at a vertex
+        self.used = bytearray(self.size)
+        self.taken = bytearray(len(triangles))
+        self.vertex_normals: list[Vector] = [(0.0, 0.0, 0.0)] * self.size
+        self.heap: list[tuple[float, int, int, int]] = []  # cost, candidate, edge, third corner
+        self.deferred: list[tuple[float, int, int, int]] = []
+        self.faces: list[tuple[int, int, int]] = []
+
+    def grown(self) -> IntArray:
+        """(F, 3) the triangles taken; those around a vertex may still form several fans."""
+        for seed in self.seeds:
+            i, j, k = self.corners[seed]
+            if self.used[i] or self.used[j] or self.used[k]:
+                continue
+            self._take(seed, (i, j, k), self.normals[seed])
+            while self.heap or self.deferred:
+                self._advance()
+        return np.array(self.faces, dtype=np.int64)
+
+    def _advance(self) -> None:
+        """Take the cheapest candidate, put it off, or drop it."""
+        gluing = not self.heap
+        entry = heapq.heappop(self.deferred if gluing else self.heap)
+        _, row, edge, k = entry
+        if edge not in self.open or self.taken[row]:
+            return
+        i, j = divmod(edge, self.size)
+        normal = self._oriented_normal(row, j, i)
+        if self.used[k]:
+            there, back = i * self.size + k, k * self.size + j
+            if self.leaving[k] == 0 or any(
+                key in held for key in (there, back) for held in (self.closed, self.open)
+            ):
+                return
+            met = [self.open.get(k * self.size + i), self.open.get(j * self.size + k)]
+            if any(side is not None and _dot(side, normal) <= SHARPEST for side in met):
+                return
+            if met == [None, None]:  # the front meets itself at a vertex alone
+                if not gluing:
+                    heapq.heappush(self.deferred, entry)
+                    return
+                other = self.vertex_normals[k]
+                if self.leaving[k] > 1 or _dot(other, normal) < GLUE * _dot(other, other) ** 0.5:
+                    return
+        self._take(row, (j, i, k), normal)
+
+    def _take(self, row: int, face: tuple[int, int, int], normal: Vector) -> None:
+        """Add a candidate with its corners in this order, and offer what its free edges border."""
+        self.taken[row] = 1
+        self.faces.append(face)
+        edges = tuple(zip(face, (*face[1:], face[0]), strict=True))
+        for i, j in edges:
+            self.used[i] = 1
+            x, y, z = self.vertex_normals[i]
+            self.vertex_normals[i] = (x + normal[0], y + normal[1], z + normal[2])
+            if self.open.pop(j * self.size + i, None) is not None:
+                self.leaving[j] -= 1
+                self.closed.update((i * self.size + j, j * self.size + i))
+            else:
+                self.open[i * self.size + j] = normal
+                self.leaving[i] += 1
+        for i, j in edges:
+            if i * self.size + j not in self.open:
+                continue
+            for other in self.candidates[min(i, j) * self.size + max(i, j)]:
+                if self.taken[other]:
+                    continue
+                cosine = _dot(self._oriented_normal(other, j, i), normal)
+                if cosine > SHARPEST:
+                    cost = self.radii[other] * (1 + self.bend_cost * (1 - cosine))
+                    third = sum(self.corners[other]) - i - j
+                    heapq.heappush(self.heap, (cost, other, i * self.size + j, third))
+
+    def _oriented_normal(self, row: int, i: int, j: int) -> Vector:
+        """The normal of a candidate, turned so that the edge from i to j runs around it."""
+        a, b, c = self.corners[row]
+        x, y, z = self.normals[row]
+        return (x, y, z) if (i, j) in ((a, b), (b, c), (c, a)) else (-x, -y, -z)
+
+
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _largest_part(points: FloatArray, faces: IntArray) -> Mesh:
+    """The largest component of oriented faces as a manifold, its small holes filled."""
+    faces = _connected(points, _single_fans(faces))
+    loops = [loop for loop in Mesh(points, faces).boundary_loops if len(loop) <= LONGEST_HOLE]
+    return Mesh(points, _connected(points, _single_fans(_filled(points, faces, loops))))
+
+
+def _connected(points: FloatArray, faces: IntArray) -> IntArray:
+    """The faces of the component with the most."""
+    label = Mesh(points, faces).face_components
+    return np.asarray(faces[label == np.bincount(label).argmax()])
+
+
+def _single_fans(faces: IntArray) -> IntArray:
+    """The oriented faces without those that make a vertex non-manifold.
+
+    Only the largest fan at each vertex stays; repeated, as this may split other fans.
+    """
+    while True:
+        _, edge_of_halfedge, _ = edge_table(faces)
+        corner = np.arange(faces.size)
+        following = np.roll(corner.reshape(-1, 3), -1, axis=1).reshape(-1)
+        order = np.argsort(edge_of_halfedge, kind="stable")
+        twin = edge_of_halfedge[order][1:] == edge_of_halfedge[order][:-1]
+        a, b = order[:-1][twin], order[1:][twin]
+        # Twins run in opposite directions: the start of one is the end of the other.
+        links = np.concatenate([a, following[a]]), np.concatenate([following[b], b])
+        graph = sparse.coo_matrix((np.ones(len(links[0]), dtype=bool), links), (faces.size,) * 2)
+        fans, label = csgraph.connected_components(graph, directed=False)
+        vertex = np.empty(fans, dtype=np.int64)
+        vertex[label] = faces.reshape(-1)
+        best = np.lexsort((-np.bincount(label), vertex))
+        keep = np.zeros(fans, dtype=bool)
+        keep[best[np.unique(vertex[best], return_index=True)[1]]] = True
+        good = keep[label].reshape(-1, 3).all(axis=1)
+        if good.all():
+            return faces
+        faces = faces[good]
+
+
+def _filled(points: FloatArray, faces: IntArray, loops: list[IntArray]) -> IntArray:
+    """The faces with each boundary loop closed by ears, the shortest first."""
+    present = {tuple(edge) for edge in edge_table(faces)[0].tolist()}
+    ears: list[list[int]] = []
+    for boundary in loops:
+        loop: list[int] = boundary[::-1].tolist()  # against the faces, as the ears will run
+        while len(loop) > 3:
+            before, after = np.roll(loop, 1), np.roll(loop, -1)
+            length = np.linalg.norm(points[after] - points[before], axis=1)
+            ends = np.sort(np.stack([before, after], axis=1), axis=1).tolist()
+            length[[tuple(pair) in present for pair in ends]] = np.inf
+            ear = int(length.argmin())
+            if not np.isfinite(length[ear]):
+                break
+            present.add(tuple(ends[ear]))
+            ears.append([int(before[ear]), loop.pop(ear), int(after[ear])])
+        if len(loop) == 3:
+            ears.append(loop)
+    return np.concatenate([faces, np.array(ears, dtype=np.int64).reshape(-1, 3)])
+
+
+def _defects(mesh: Mesh) -> int:
+    """What a triangulation has of handles, boundary edges and unused points."""
+    boundary = int((mesh.edge_face_count == 1).sum())
+    return HANDLE * mesh.genus + boundary + int((~mesh.referenced).sum())
