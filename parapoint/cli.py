@@ -67,7 +67,7 @@ def fit(surface: str, out: str, as_json: bool, **settings: Any) -> None:
     given = read_surface(surface)
     if Path(out).exists() and not Path(out).is_dir():
         raise InputError(f"{out}: is a file; --out names a folder")
-    model = _fitted(given, settings, checkpoint=out)
+    model = _fitted(surface, given, settings, checkpoint=out)
     model.save(out)
     _print({"model": out, **model.report_}, as_json, f"{out}: {_summary(model)}")
 
@@ -106,7 +106,7 @@ def unwrap(surface: str, out: str, as_json: bool, **settings: Any) -> None:
     """
     _check_target(out)
     given = read_surface(surface)
-    model = _fitted(given, settings, checkpoint=None)
+    model = _fitted(surface, given, settings, checkpoint=None)
     facts = _write(model, given, out, checkerboard())
     _print({**facts, **model.report_}, as_json, f"{out}: {_summary(model)}")
 
@@ -126,7 +126,7 @@ def _check_target(path: str) -> None:
 
 
 def _fitted(
-    surface: Surface, settings: dict[str, Any], *, checkpoint: str | None
+    path: str, surface: Surface, settings: dict[str, Any], *, checkpoint: str | None
 ) -> estimator.ParaPoint:
     """A model fitted under a progress bar on standard error, none where that is no terminal."""
     from parapoint.estimator import ParaPoint
@@ -142,6 +142,8 @@ def _fitted(
             return model.fit(surface, checkpoint=checkpoint, callback=advance)
     except DivergedError as error:
         raise click.ClickException(str(error)) from error
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
 
 
 @contextmanager

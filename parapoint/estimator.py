@@ -109,6 +109,7 @@ class ParaPoint:
     """
 
     requires: ClassVar[frozenset[str]] = frozenset()
+    packages: ClassVar[tuple[str, ...]] = ("torch",)
 
     preset: str = "fast"
     points: int | None = None
