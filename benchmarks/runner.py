@@ -395,6 +395,8 @@ def _changed(
     here: Mapping[str, Any],
 ) -> str:
     """Why a cell that has a row must run again; "" if it need not."""
+    if not cell.surface_hash:  # the model cannot be had now: what is known of it stays
+        return ""
     if row.source_hash != cell.source_hash:
         return "method changed"
     if row.surface_hash != cell.surface_hash:
@@ -403,8 +405,6 @@ def _changed(
         return "method changed"
     if row.status == "ok":
         return "" if store.uv_path(row.id).exists() else "map missing"
-    if row.status == "skipped" and not row.surface_hash:
-        return ""
     there = runs[row.run] if 0 <= row.run < len(runs) else {}
     if any(there.get(name) != here[name] for name in environment.MACHINE):
         return f"{row.status} in another environment"

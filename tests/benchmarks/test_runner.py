@@ -331,6 +331,11 @@ def test_a_missing_model_is_a_skipped_row_and_the_rest_runs(tmp_path, monkeypatc
             run(both, tmp_path / "asked", cases=["sphere"])
         assert not (tmp_path / "asked").exists()
     assert dict(run(both, tmp_path).reasons) == {"model was missing": 1}
+    with monkeypatch.context() as patch:  # gone again: its result stays
+        patch.setattr(models, "load", without_sphere)
+        summary = run(both, tmp_path)
+        assert summary.ran == []
+        assert {row.case: row.status for row in summary.kept} == {CASE: "ok", "sphere": "ok"}
 
 
 def test_a_model_is_read_once_and_its_own_map_is_the_reference(tmp_path, monkeypatch):
