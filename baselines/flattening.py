@@ -9,7 +9,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from parapoint.errors import InputError
-from parapoint.method import UnsupportedError, is_planar_domain
+from parapoint.method import UnsupportedError
 from parapoint.surface import FloatArray, IntArray, Mesh, Surface
 
 
@@ -41,7 +41,7 @@ def domain(surface: Surface) -> Domain:
     """
     if not isinstance(surface, Mesh):
         raise UnsupportedError("needs faces; the surface is a point cloud")
-    if not is_planar_domain(surface):
+    if not surface.is_planar_domain:
         raise UnsupportedError(f"needs a disk; the surface is {surface.topology}")
     vertices, faces, loop = surface.vertices, surface.faces, surface.boundary_loops[0]
     if not surface.referenced.all():

@@ -55,8 +55,9 @@ from benchmarks.results import (
     trace_arrays,
     write_arrays,
 )
-from parapoint.method import UnsupportedError, prepared
+from parapoint.method import UnsupportedError
 from parapoint.parameterization import Parameterization, PointParameterization
+from parapoint.preparation import prepared
 from parapoint.surface import Mesh, Surface
 
 POLL = 0.05

@@ -50,22 +50,6 @@ def _cuda_missing(_: Surface) -> str | None:
     return None if torch.cuda.is_available() else "needs a CUDA device; none is available"
 
 
-def is_planar_domain(mesh: Mesh) -> bool:
-    """Whether the mesh is a disk, with or without holes: it embeds in the plane without a cut."""
-    return (
-        mesh.is_manifold
-        and mesh.is_oriented
-        and mesh.component_count == 1
-        and len(mesh.boundary_loops) > 0
-        and mesh.genus == 0
-    )
-
-
-def is_cuttable(mesh: Mesh) -> bool:
-    """Whether `cutting.cut_to_disk` can open the mesh: connected, manifold and oriented."""
-    return mesh.is_manifold and mesh.is_oriented and mesh.component_count == 1
-
-
 REQUIREMENTS: dict[str, Callable[[Surface], str | None]] = {
     "faces": _topology_unless(lambda _: True, "faces"),
     "manifold": _topology_unless(lambda mesh: mesh.is_manifold, "a manifold mesh"),
@@ -73,7 +57,8 @@ REQUIREMENTS: dict[str, Callable[[Surface], str | None]] = {
     "connected": _topology_unless(lambda mesh: mesh.component_count == 1, "a connected mesh"),
     "disk": _topology_unless(lambda mesh: mesh.topology == "disk", "a disk"),
     "disk_after_cut": _topology_unless(
-        is_cuttable, "a connected, manifold, consistently oriented mesh (others have no disk cut)"
+        lambda mesh: mesh.is_connected_surface,
+        "a connected, manifold, consistently oriented mesh (others have no disk cut)",
     ),
     "cuda": _cuda_missing,
 }
@@ -83,21 +68,3 @@ REQUIREMENTS: dict[str, Callable[[Surface], str | None]] = {
 a surface that is no disk (with or without holes) is cut before the method sees it, by the same
 automatic cut for every method, and the row says so.
 """
-
-
-def prepared(surface: Surface, requires: frozenset[str]) -> tuple[Surface, str]:
-    """`surface` as a method that `requires` these words gets it, and the step taken ("" for none).
-
-    Raises:
-        UnsupportedError: the surface does not meet a requirement.
-        KeyError: a word is not in REQUIREMENTS.
-    """
-    for word in sorted(requires):
-        reason = REQUIREMENTS[word](surface)
-        if reason is not None:
-            raise UnsupportedError(reason)
-    if "disk_after_cut" in requires and isinstance(surface, Mesh) and not is_planar_domain(surface):
-        from parapoint.cutting import cut_to_disk
-
-        return cut_to_disk(surface), "automatic cut to a disk"
-    return surface, ""

@@ -169,6 +169,16 @@ class Mesh:
         return len(np.unique(self.halfedges, axis=0)) == len(self.halfedges)
 
     @property
+    def is_connected_surface(self) -> bool:
+        """Connected, manifold and consistently oriented: what can be cut to a disk."""
+        return self.is_manifold and self.is_oriented and self.component_count == 1
+
+    @property
+    def is_planar_domain(self) -> bool:
+        """Whether it is a disk, with or without holes: it embeds in the plane without a cut."""
+        return self.is_connected_surface and len(self.boundary_loops) > 0 and self.genus == 0
+
+    @property
     def genus(self) -> int:
         """Number of handles of a connected, manifold, oriented surface."""
         return (2 - self.euler_characteristic - len(self.boundary_loops)) // 2

@@ -11,8 +11,9 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from parapoint.cutting import cut_along
-from parapoint.method import REQUIREMENTS, Method, UnsupportedError, prepared
+from parapoint.method import REQUIREMENTS, Method, UnsupportedError
 from parapoint.parameterization import Parameterization, PointParameterization
+from parapoint.preparation import prepared
 from parapoint.surface import FloatArray, IntArray, Mesh, PointCloud, Surface
 
 SEED = 7

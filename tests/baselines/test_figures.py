@@ -9,7 +9,7 @@ import pytest
 
 from baselines import registry
 from baselines.flattening import signed_areas
-from parapoint.method import prepared
+from parapoint.preparation import prepared
 
 
 def model(name):
