@@ -10,7 +10,7 @@ from scipy.sparse import csgraph
 
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
-from parapoint.surface import FloatArray, IntArray, Mesh, Surface
+from parapoint.surface import FloatArray, IntArray, Mesh, Surface, flat_faces
 
 
 class FlatteningError(RuntimeError):
@@ -78,11 +78,7 @@ def check_triangles(vertices: FloatArray, faces: IntArray) -> None:
     Raises:
         InputError: names the first such face and their number.
     """
-    corners = vertices[faces]
-    sides = corners - np.roll(corners, 1, axis=1)
-    longest = (sides**2).sum(axis=2).max(axis=1)
-    double_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    flat = double_area <= 8 * np.finfo(np.float64).eps * longest
+    flat = flat_faces(vertices, faces)
     if flat.any():
         raise InputError(
             f"face {int(flat.argmax())} has no area (one of {int(flat.sum())} such faces): "

@@ -60,6 +60,15 @@ def edge_table(triangles: IntArray) -> tuple[IntArray, IntArray, IntArray]:
     return edges, edge_of_halfedge.reshape(-1).astype(np.int64), count.astype(np.int64)
 
 
+def flat_faces(vertices: FloatArray, faces: IntArray) -> BoolArray:
+    """(F,) which triangles have no area beyond rounding: no cotangent, gradient or normal."""
+    corners = vertices[faces]
+    sides = corners - np.roll(corners, 1, axis=1)
+    longest = (sides**2).sum(axis=2).max(axis=1)
+    double_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    return np.asarray(double_area <= 8 * np.finfo(np.float64).eps * longest)
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """A triangle mesh.

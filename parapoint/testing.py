@@ -23,8 +23,8 @@ def check_method(method: Method, surface: Surface | None = None) -> None:
     """Hold a method to the protocol, on tiny surfaces (under 200 vertices each).
 
     - It is a dataclass, its parameters and its report can be written as JSON, it can be pickled.
-    - `requires` has known words only and is honest: what it admits is parameterized (after the cut
-      where it says `disk_after_cut`); a method that needs faces raises on a point cloud.
+    - `requires` has known words only and is honest: what it admits is parameterized (as
+      `parapoint.preparation` hands it over); a method that needs faces raises on a point cloud.
     - The map has the type for the surface, is finite and not collapsed to a line, and its faces and
       corners are in the order of the mesh.
     - The same seed gives the same map, bit by bit. The arrays of the surface do not change.
@@ -47,16 +47,16 @@ def check_method(method: Method, surface: Surface | None = None) -> None:
     for title, sample in surfaces.items():
         where = f"{name} on {title}"
         try:
-            given, _ = prepared(sample, method.requires)
+            preparation = prepared(sample, method.requires)
         except UnsupportedError as error:
             refusal = error
             if isinstance(sample, PointCloud):
                 _check_refusal(method, sample, where)
             continue
         try:
-            first = _check_run(method, given, where)
+            maps = [_check_run(method, part, where) for part in preparation.parts]
             if not checked:
-                _check_repeat(method, given, first, where)
+                _check_repeat(method, preparation.parts[0], maps[0], where)
         except UnsupportedError as error:
             refusal = error
             if checked:
