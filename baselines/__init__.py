@@ -40,7 +40,7 @@ installed, `planar` is then a method like any other:
 What a method may count on, and what it must keep:
 
 - A mesh is manifold, oriented, connected, ... only if `requires` says so. One that is not is made
-  so, the same way for every method (`parapoint.preparation`): its components come one after another,
+  so, the same way for every method (`parapoint.preparation`): its components come in turn,
   and with `disk_after_cut` closed ones and those with handles come cut to a disk, disks with holes
   as they are. With `disk`, what is no disk is not handed over, and its row is `skipped`.
 - Vertices may be duplicate or unreferenced, triangles thin, scales any. Arrays are read-only.
