@@ -150,12 +150,14 @@ def _repaired(mesh: Mesh, words: frozenset[str]) -> tuple[list[Mesh], list[str],
 
     whole = _welded(mesh)
     note(int(mesh.referenced.sum() - whole.referenced.sum()), "welded", "vertex", "vertices")
-    faces, flips = _with_flipped_edges(whole)
+    solid = (whole.faces != np.roll(whole.faces, 1, axis=1)).all(axis=1)
+    if flat_faces(whole.vertices, whole.faces).all():
+        raise UnsupportedError("needs faces with an area; no face of the surface has any")
+    faces, flips = _with_flipped_edges(Mesh(whole.vertices, whole.faces[solid]))
     note(flips, "flipped the long edge of", "face without area", "faces without area")
     flat = flat_faces(whole.vertices, faces)
-    if flat.all():
-        raise UnsupportedError("needs faces with an area; no face of the surface has any")
-    note(int(flat.sum()), "dropped", "face without area", "faces without area")
+    count = int((~solid).sum() + flat.sum())
+    note(count, "dropped", "face without area", "faces without area")
     single = _first_of_each(np.sort(faces, axis=1))
     note(int((~single & ~flat).sum()), "dropped", "duplicate face")
     note(int((~mesh.referenced).sum()), "dropped", "unreferenced vertex", "unreferenced vertices")
