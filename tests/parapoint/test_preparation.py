@@ -201,6 +201,21 @@ def test_an_error_names_its_component():
     assert caught.value.__notes__ == ["(component 2 of 2, 4 faces)"]
 
 
+@pytest.mark.parametrize("seed", range(40))
+def test_any_faces_whatever_become_planar_domains(seed):
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(4, 12))
+    points = rng.integers(0, 4, (count, 3)).astype(float)
+    faces = rng.integers(0, count, (int(rng.integers(4, 40)), 3))
+    preparation, result = mapped(Mesh(points, faces))
+    assert all(part.is_planar_domain for part in preparation.parts)
+    kept = ~flat_faces(points, faces)
+    if len(preparation.parts) == 1:
+        images = points[faces][:, :, :2]
+        assert_array_equal(result.uv[result.corners][kept], images[kept])
+    assert sum(len(part.faces) for part in preparation.parts) <= len(faces)
+
+
 def test_what_cannot_be_mended_is_refused_with_the_reason():
     with pytest.raises(UnsupportedError, match="needs a disk; the surface is sphere"):
         prepared(TETRAHEDRON, frozenset({"disk"}))
