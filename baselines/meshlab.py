@@ -94,7 +94,7 @@ class MeshLabVoronoi:
 
     The filter draws its cells from a generator that cannot be seeded: a fresh process, as each cell
     of a run is, repeats a map, a second call in one process does not. It does not end where there
-    are hardly more vertices than cells.
+    are hardly more vertices than cells, or neighbouring faces turn differently.
 
     Attributes:
         regions: number of cells to begin with, in each component.
@@ -102,7 +102,7 @@ class MeshLabVoronoi:
 
     regions: int = 10
 
-    requires: ClassVar[frozenset[str]] = frozenset({"faces", "manifold", "connected"})
+    requires: ClassVar[frozenset[str]] = frozenset({"faces", "oriented", "connected"})
     packages: ClassVar[tuple[str, ...]] = ("pymeshlab",)
 
     def parameterize(self, surface: Surface, *, seed: int) -> Parameterization:  # noqa: ARG002 (the filter takes no seed)
