@@ -87,6 +87,7 @@ def sample_surfaces() -> dict[str, Surface]:
         "a disk with a hole": holed,
         "a sphere": sphere(),
         "two components": two,
+        "a defective mesh": defective(),
         "a point cloud": PointCloud(np.column_stack([plane, 0.3 * plane[:, 0] ** 2])),
     }
 
@@ -117,6 +118,16 @@ def sphere() -> Mesh:
     inward = np.linalg.det(points[faces]) < 0
     faces[inward] = faces[inward][:, ::-1]
     return Mesh(points, faces)
+
+
+def defective() -> Mesh:
+    """`sphere` with a fin on an edge, a copy of a face, one without area, and faces turned over."""
+    whole = sphere()
+    a, b, c = whole.faces[0]
+    added = np.array([[a, b, len(whole.vertices)], [b, c, a], [a, b, b]])
+    faces = np.concatenate([added, whole.faces])
+    faces[7::9] = faces[7::9, ::-1]
+    return Mesh(np.concatenate([whole.vertices, 1.5 * whole.vertices[[a]]]), faces)
 
 
 def _check_declaration(method: Method, name: str) -> None:
