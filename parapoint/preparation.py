@@ -15,9 +15,10 @@ What a method `requires` decides: a method gets the surface as it is wherever th
 
 A connected, manifold, oriented surface of faces with area is thus cut at most.
 
-The map that comes back is one of the faces as they were, in order. A copy lies where the face that
-was kept lies, so it overlaps it; a face without area has the images of its vertices on the faces
-beside it. It is in no mean, as it is degenerate in 3D, and adds no seam.
+The map that comes back is one of the faces as they were, in order. A copy lies on the face that was
+kept: it overlaps that, and is flipped if it was the other way round. A face without area has the
+images of its vertices on the faces beside it; it is in no mean, as it is degenerate in 3D, and adds
+no seam.
 """
 
 from __future__ import annotations
