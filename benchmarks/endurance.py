@@ -1,10 +1,11 @@
-"""`python -m benchmarks.endurance`: does a run survive what it must, and what does it cost?
+"""`python -m benchmarks.endurance`: what a run survives, and what the harness costs.
 
-kills   a run is killed (kill -9) a thousand times at random instants and taken up again:
-        no row that had been reported done is lost, none is damaged, and each table that comes
-        of it is the one of a run that was never disturbed
-scale   a run of instant methods: what the harness costs a cell, how that grows with the number
-        of cells, how large the store becomes, how long a finished run takes to say so
+`kills`: a run is killed (kill -9) a thousand times at random instants and taken up again. No row
+that had been reported done is lost, none is damaged, and each table that comes of it is the one of
+a run that was never disturbed.
+
+`scale`: runs of an instant method. What the harness costs a cell, whether that grows with the
+number of cells, how large the store becomes, how long a finished run takes to say so.
 """
 
 from __future__ import annotations
@@ -77,7 +78,7 @@ def toll(suite: Suite, folder: Path, *, count: int, seed: int) -> Toll:
     Every time it comes to its end its table is compared with that of a run that was left alone,
     and it begins anew in another folder.
     """
-    draw = random.Random(seed)
+    draw = random.Random(seed)  # noqa: S311  no secret
     found = Toll()
     whole = runner.run(suite, folder / "undisturbed", plugins=[PLUGIN]).seconds
     expected = _table(Store(folder / "undisturbed"))

@@ -22,7 +22,7 @@ class Instant:
     requires: ClassVar[frozenset[str]] = frozenset({"faces"})
 
     def parameterize(self, surface: Surface, *, seed: int) -> Parameterization:
-        """x and y, scaled by what sets one cell apart from another."""
+        """The first two coordinates, scaled by what sets one cell apart from another."""
         assert isinstance(surface, Mesh)
         scale = 1 + self.variant + seed / 10
         return Parameterization(surface.vertices[:, :2] * scale, surface.faces)
