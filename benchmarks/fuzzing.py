@@ -242,6 +242,7 @@ def _exported(mesh: Any, kind: str) -> bytes:
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("target", type=click.Choice(list(TARGETS)))
 @click.option("--runs", type=click.IntRange(1), default=100_000, show_default=True)
+@click.option("--seconds", type=click.IntRange(1), help="End after so long.  [default: never]")
 @click.option("--seed", type=click.IntRange(1), default=1, show_default=True)
 @click.option(
     "--out",
@@ -250,7 +251,7 @@ def _exported(mesh: Any, kind: str) -> bytes:
     show_default=True,
     help="Keeps what inputs were worth keeping, and findings.",
 )
-def main(target: str, *, runs: int, seed: int, out: Path) -> None:
+def main(target: str, *, runs: int, seconds: int | None, seed: int, out: Path) -> None:
     """Feed a TARGET with RUNS inputs; ends with an error at the first finding."""
     try:
         import atheris
@@ -267,6 +268,7 @@ def main(target: str, *, runs: int, seed: int, out: Path) -> None:
         atheris.instrument_func(function)
     run = functools.partial(guarded, TARGETS[target])
     arguments = [f"-runs={runs}", f"-seed={seed}", f"-max_len={LONGEST}", "-timeout=60"]
+    arguments.append(f"-max_total_time={seconds or 0}")
     atheris.Setup([sys.argv[0], *arguments, f"-artifact_prefix={out}/{target}-", str(corpus)], run)
     atheris.Fuzz()
 

@@ -90,6 +90,7 @@ class ResultRow:
         uv_sha256: `arrays_hash` of the map: the same map has the same hash, whatever its trace.
         report: what the method wrote beside its result (energies, iterations, weights).
         run: entry of `environment()["runs"]` in which the cell ran.
+        host: name and processor of the worker that ran it; "" where that was the run's own machine.
     """
 
     id: str
@@ -111,6 +112,7 @@ class ResultRow:
     uv_sha256: str = ""
     report: Mapping[str, object] = field(default_factory=dict)
     run: int = 0
+    host: str = ""
 
     @property
     def cell(self) -> str:
@@ -225,7 +227,7 @@ def write_arrays(path: Path, arrays: Arrays) -> None:
         else array
         for name, array in arrays.items()
     }
-    with _replacing(path) as stream:
+    with replacing(path) as stream:
         np.savez_compressed(stream, allow_pickle=False, **small)
 
 
@@ -250,7 +252,7 @@ def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
 
 
 @contextlib.contextmanager
-def _replacing(path: Path) -> Iterator[typing.IO[bytes]]:
+def replacing(path: Path) -> Iterator[typing.IO[bytes]]:
     """A stream whose content becomes the file `path`, in one step, when the block ends well."""
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
@@ -307,7 +309,7 @@ def _row(line: bytes) -> ResultRow | None:
         return None
     if row.surface_hash and not _NAME.fullmatch(row.surface_hash):
         return None
-    texts = (row.suite, row.case, row.method, row.source_hash, row.reason, row.uv_sha256)
+    texts = (row.suite, row.case, row.method, row.source_hash, row.reason, row.uv_sha256, row.host)
     typed = (
         all(isinstance(text, str) for text in texts)
         and row.status in typing.get_args(Status)
@@ -469,7 +471,7 @@ class Store:
         path = self.folder / "metrics.parquet"
         content = io.BytesIO()
         frame.to_parquet(content, index=False)
-        with contextlib.suppress(PermissionError), disk_said(path), _replacing(path) as stream:
+        with contextlib.suppress(PermissionError), disk_said(path), replacing(path) as stream:
             stream.write(content.getbuffer())
 
     def faults(self, sample: int = 20) -> Iterator[str]:
@@ -687,7 +689,7 @@ class Store:
     def note_surfaces(self, hashes: Mapping[str, str]) -> None:
         """Keep what `surface_hashes` is to return: a later run need not read those models."""
         path = self.folder / "surfaces.json"
-        with disk_said(path), _replacing(path) as stream:
+        with disk_said(path), replacing(path) as stream:
             stream.write(json.dumps(hashes, indent=1).encode() + b"\n")
 
     def add_map(self, row_id: str, path: Path) -> None:
@@ -703,7 +705,7 @@ class Store:
         content = self.environment()
         content["runs"].append(plain(entry))
         path = self.folder / "environment.json"
-        with disk_said(path), _replacing(path) as stream:
+        with disk_said(path), replacing(path) as stream:
             stream.write(json.dumps(content, indent=1).encode() + b"\n")
         return len(content["runs"]) - 1
 

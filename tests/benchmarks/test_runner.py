@@ -14,7 +14,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from benchmarks import models, runner, worker
+from benchmarks import executors, models, runner, worker
 from benchmarks.results import ResultRow, Store
 from benchmarks.runner import Summary, run
 from benchmarks.suites import Suite
@@ -46,8 +46,8 @@ FAULTS = {
     "eater": """
         hoard = []
         while True:
-            hoard.append(np.ones(1 << 20))
-            time.sleep(0.002)
+            hoard.append(np.ones(1 << 21))
+            time.sleep(0.005)
         """,
     "refused": "raise MemoryError",
     "sleeper": """
@@ -134,21 +134,21 @@ def unmeasured(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runner, "_measure", lambda *_: None)
 
 
-class InProcess(runner._Pool):
+class InProcess(executors.Local):
     """Does cells where it stands: for what is not about processes."""
 
     def run(self, tasks, _):
         for task in tasks:
             task.began()
             path = self.folder.with_name("map.npz")
-            outcome = worker._outcome({**task.job, "map": str(path)})
+            outcome = worker._outcome({**task.job, **task.inputs, "map": str(path)})
             task.ended(outcome | {"took": 0.0}, "", path)
 
 
 @pytest.fixture
 def in_process(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runner, "_measure", lambda *_: None)
-    monkeypatch.setattr(runner, "_Pool", InProcess)
+    monkeypatch.setattr(executors, "Local", InProcess)
 
 
 def row_of(faulty: tuple[Summary, Store], method: str) -> ResultRow:
