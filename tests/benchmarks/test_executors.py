@@ -43,8 +43,7 @@ class NAME:
         if seed == 1:
             print("the last words")
             os._exit(3)
-        uv = np.random.random((len(surface.vertices), 2))
-        return Parameterization(uv, surface.faces)
+        return Parameterization(surface.vertices[:, :2] + np.random.random(), surface.faces)
 """
 NUMBERS = itertools.count()
 TIMING = ("seconds", "cpu_seconds", "peak_memory_mb", "host", "run")
