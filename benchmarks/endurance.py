@@ -180,5 +180,35 @@ def kills(ctx: click.Context, count: int, seed: int) -> None:
         ctx.exit(1)
 
 
+@main.command()
+@click.option("--models", type=click.IntRange(1), default=1000, show_default=True)
+@click.option("--methods", type=click.IntRange(1), default=12, show_default=True)
+@click.option("--seeds", type=click.IntRange(1), default=3, show_default=True)
+@click.option("--jobs", type=click.IntRange(1), default=2, show_default=True)
+@click.option("--out", type=click.Path(path_type=Path), default=Path("results/scale"))
+def scale(models: int, methods: int, seeds: int, jobs: int, out: Path) -> None:
+    """Run instant methods, and say what the harness costs; a run that was stopped goes on."""
+    suite = instant_suite(out / "models", models, methods, seeds)
+    store = out / "store"
+    for title in ("run", "run again"):
+        began, used = time.monotonic(), _processor_seconds()
+        summary = runner.run(suite, store, plugins=[PLUGIN], jobs=jobs)
+        seconds, used = time.monotonic() - began, _processor_seconds() - used
+        print(
+            f"{title}: {len(summary.ran)} cells after {len(summary.kept)}: {seconds:.1f} s, "
+            f"{used:.1f} s of processor time"
+        )
+        if summary.ran:
+            print(f"  a cell: {seconds / len(summary.ran):.4f} s, {used / len(summary.ran):.4f} s")
+    cells = len(summary.kept)
+    size = sum(path.stat().st_size for path in store.rglob("*") if path.is_file())
+    print(f"store: {size / 1e6:.1f} MB, {size / cells:.0f} bytes a cell")
+
+
+def _processor_seconds() -> float:
+    """Processor time of this process and of those that it has waited for."""
+    return sum(os.times()[:4])
+
+
 if __name__ == "__main__":
     console.run(main)

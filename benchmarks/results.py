@@ -31,7 +31,7 @@ import sys
 import typing
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
@@ -421,13 +421,10 @@ class Store:
 
     def unmeasured(self) -> list[ResultRow]:
         """The rows with a map whose metrics are not in `metrics.parquet`, or of an older source."""
-        known = self._known_metrics()
-        source = _metrics_source()
-        return [
-            row
-            for row in self.rows()
-            if row.uv_sha256 and self._metrics_key(row, source) not in known
-        ]
+        frame = self._metrics_table()
+        known = set() if frame is None else set(frame["metrics_key"])
+        keys = self._metrics_keys(rows := self.rows())
+        return [row for row in rows if row.uv_sha256 and keys[row.id] not in known]
 
     def metrics(self, measured: Mapping[str, Mapping[str, float]] | None = None) -> pd.DataFrame:
         """One row a cell: suite, case, method, params, seed, status, every metric by name, id.
@@ -441,18 +438,19 @@ class Store:
         import pandas as pd
 
         names = _metric_names()
-        known = self._known_metrics()
-        source = _metrics_source()
+        table = self._metrics_table()
+        keys = self._metrics_keys(rows := self.rows())
+        if table is not None and table["metrics_key"].tolist() == [keys[row.id] for row in rows]:
+            return table
+        known = _by_key(table)
         records: list[dict[str, object]] = []
-        added = False
-        for row in self.rows():
-            key = self._metrics_key(row, source)
+        for row in rows:
+            key = keys[row.id]
             if key in known:
                 values = known[key]
             else:
                 given = (measured or {}).get(row.id)
                 values = self._measured(row) if given is None else dict(given)
-                added = True
             cell = (row.suite, row.case, row.method, json.dumps(row.params), row.seed, row.status)
             start = dict(zip(IDENTITY_COLUMNS, cell, strict=True))
             records.append({**start, **values, "id": row.id, "metrics_key": key})
@@ -462,8 +460,7 @@ class Store:
         columns = [*IDENTITY_COLUMNS, *numbers, "id", "metrics_key"]
         frame = pd.DataFrame.from_records(records, columns=columns)
         frame = frame.astype(dict.fromkeys(numbers, "float64") | {"seed": "int64"})
-        if added or len(known) != len(records):
-            self._write_metrics(frame)
+        self._write_metrics(frame)
         return frame
 
     def _write_metrics(self, frame: pd.DataFrame) -> None:
@@ -521,9 +518,8 @@ class Store:
 
     def _metric_faults(self, rows: list[ResultRow], sample: int) -> Iterator[str]:
         """Where `metrics.parquet` differs from what `sample` of the maps give."""
-        known = self._known_metrics()
-        source = _metrics_source()
-        keys = {row.id: self._metrics_key(row, source) for row in rows}
+        known = _by_key(self._metrics_table())
+        keys = self._metrics_keys(rows)
         measured = [row for row in rows if row.status == "ok" and keys[row.id] in known]
         for row in measured[:: max(1, len(measured) // sample)][:sample]:
             stored = known[keys[row.id]]
@@ -536,27 +532,36 @@ class Store:
                         f"{stored.get(name)} in metrics.parquet, {value} from the map"
                     )
 
-    def _known_metrics(self) -> dict[str, dict[str, float]]:
-        """The values in `metrics.parquet` by their key; none where it is missing or damaged."""
+    def _metrics_table(self) -> pd.DataFrame | None:
+        """What is in `metrics.parquet`; None where it is missing or damaged."""
         import pandas as pd
         import pyarrow as pa
 
         path = self.folder / "metrics.parquet"
         try:
             frame = pd.read_parquet(path)
-            values = frame.drop(columns=[*IDENTITY_COLUMNS, "id"]).set_index("metrics_key")
         except FileNotFoundError:
-            return {}
+            return None
         except (OSError, ValueError, KeyError, pa.ArrowException):
+            frame = pd.DataFrame()
+        columns = list(frame.columns)
+        numbers = columns[len(IDENTITY_COLUMNS) : -2]
+        whole = columns == [*IDENTITY_COLUMNS, *numbers, "id", "metrics_key"]
+        whole = whole and frame["metrics_key"].is_unique
+        if not whole or set(map(str, frame[numbers].dtypes)) - {"float64"}:
             _log.warning("%s: damaged; computed anew", path)
-            return {}
-        return {str(key): record for key, record in values.to_dict("index").items()}  # type: ignore[misc]
+            return None
+        return frame
 
-    def _metrics_key(self, row: ResultRow, source: str) -> str:
-        """What the metrics of a row depend on, as a hash: its map, any reference, their source."""
-        reference = bool(row.surface_hash) and self.reference_path(row.surface_hash).exists()
-        text = f"{row.id} {row.uv_sha256} {reference} {source}"
-        return hashlib.sha256(text.encode()).hexdigest()[:32]
+    def _metrics_keys(self, rows: Sequence[ResultRow]) -> dict[str, str]:
+        """What the metrics of each row depend on, by its id: map, any reference, their source."""
+        source = _metrics_source()
+        references = {path.stem for path in (self.folder / "references").glob("*.npz")}
+        texts = {
+            row.id: f"{row.id} {row.uv_sha256} {row.surface_hash in references} {source}"
+            for row in rows
+        }
+        return {key: hashlib.sha256(text.encode()).hexdigest()[:32] for key, text in texts.items()}
 
     def _measured(self, row: ResultRow) -> dict[str, float]:
         """Every metric of a row's map; none where it has no map or its files are damaged."""
@@ -760,6 +765,14 @@ def measured(
     if isinstance(surface, PointCloud) and isinstance(result, PointParameterization):
         return metrics.evaluate_points(surface, result)
     raise InputError("a map of a mesh for a point cloud, or the other way round")
+
+
+def _by_key(table: pd.DataFrame | None) -> dict[str, dict[str, float]]:
+    """The values of a metrics table by their key."""
+    if table is None:
+        return {}
+    values = table.drop(columns=[*IDENTITY_COLUMNS, "id"]).set_index("metrics_key")
+    return {str(key): record for key, record in values.to_dict("index").items()}  # type: ignore[misc]
 
 
 def _metric_names() -> list[str]:
