@@ -286,14 +286,14 @@ def _write_whole(stream: int, line: bytes) -> None:
 
 @contextlib.contextmanager
 def disk_said(path: Path) -> Iterator[None]:
-    """Says a full disk in one clear line."""
+    """Says a full disk, or a limit on files that is reached, in one clear line."""
     try:
         yield
     except OSError as error:
-        if error.errno in {errno.ENOSPC, errno.EDQUOT}:
+        if error.errno in {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}:
             raise InputError(
-                f"{path}: no space left on the disk; earlier results are intact: make room and "
-                "run the same command again"
+                f"{path}: {os.strerror(error.errno).lower()}; earlier results are intact: make "
+                "room and run the same command again"
             ) from None
         raise
 

@@ -65,8 +65,8 @@ class Summary:
     Attributes:
         suite: the suite, with the cases, methods and seeds that were asked for.
         methods: its methods.
+        planned: the cells that had to run.
         ran: rows of the cells that ran, in the order in which they ended.
-        reasons: how many cells ran for which reason.
         kept: rows of the cells that needed no run.
         missing: the cases whose model could not be had, and how to get each.
         unmeasured: ids of the rows whose metrics could not be computed, and why.
@@ -76,8 +76,8 @@ class Summary:
 
     suite: Suite
     methods: Sequence[Chosen]
+    planned: list[Cell] = field(default_factory=list)
     ran: list[ResultRow] = field(default_factory=list)
-    reasons: Counter[str] = field(default_factory=Counter)
     kept: list[ResultRow] = field(default_factory=list)
     missing: dict[str, str] = field(default_factory=dict)
     unmeasured: dict[str, str] = field(default_factory=dict)
@@ -96,6 +96,11 @@ class Summary:
         )
 
     @property
+    def reasons(self) -> Counter[str]:
+        """How many cells had to run for which reason."""
+        return Counter(cell.why for cell in self.planned)
+
+    @property
     def rows(self) -> list[ResultRow]:
         """Rows of all cells of the run, kept or new."""
         return [*self.kept, *self.ran]
@@ -104,8 +109,8 @@ class Summary:
 class Progress:
     """Hears how a run goes; this one says nothing."""
 
-    def planned(self, summary: Summary, count: int) -> None:
-        """`count` cells are going to run."""
+    def planned(self, summary: Summary) -> None:
+        """It is known what is going to run."""
 
     def started(self, cell: Cell) -> None:
         """A cell begins."""
@@ -172,8 +177,9 @@ def run(
         surfaces = _surfaces(store, suite.cases, summary)
         here = environment.environment() | limits
         here |= {"executor": executor, "jobs": jobs, "threads": hands.threads}
-        todo = list(_todo(suite, chosen, surfaces, store=store, here=here, summary=summary))
-        progress.planned(summary, len(todo))
+        todo = summary.planned
+        todo += _todo(suite, chosen, surfaces, store=store, here=here, summary=summary)
+        progress.planned(summary)
         if todo:
             number = store.add_run(here | {"suite": suite.name})
             book = _Book(store, number, summary, progress)
@@ -348,7 +354,6 @@ def _todo(
                 row = rows.get(blank.cell)
                 why = "new" if row is None else _changed(blank, row, store, runs, here)
                 if why:
-                    summary.reasons[why] += 1
                     yield Cell(blank, method.spec, why)
                 elif row is not None:
                     summary.kept.append(row)

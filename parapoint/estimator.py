@@ -127,6 +127,11 @@ class ParaPoint:
     device: str = "auto"
     threads: int | None = None
 
+    @property
+    def deterministic(self) -> bool:
+        """Whether the same seed gives the same map: not where time ends the fit, nor on CUDA."""
+        return self.time_budget is None and _device(self.device) == "cpu"
+
     def get_params(self, deep: bool = True) -> dict[str, Any]:  # noqa: ARG002 (scikit-learn's name)
         """The parameters by name."""
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}

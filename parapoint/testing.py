@@ -26,7 +26,8 @@ def check_method(method: Method, surface: Surface | None = None) -> None:
       where it says `disk_after_cut`); a method that needs faces raises on a point cloud.
     - The map has the type for the surface, is finite and not collapsed to a line, and its faces and
       corners are in the order of the mesh.
-    - The same seed gives the same map, bit by bit. The arrays of the surface do not change.
+    - The same seed gives the same map, bit by bit, unless the method says that it is not
+      `deterministic`. The arrays of the surface do not change.
     - A trace counts up in steps and seconds, and its maps are finite and of the result's shape.
 
     Args:
@@ -54,7 +55,7 @@ def check_method(method: Method, surface: Surface | None = None) -> None:
             continue
         try:
             first = _check_run(method, given, where)
-            if not checked:
+            if not checked and getattr(method, "deterministic", True):
                 _check_repeat(method, given, first, where)
         except UnsupportedError as error:
             refusal = error
