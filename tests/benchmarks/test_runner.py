@@ -422,7 +422,7 @@ def test_a_file_that_may_not_grow_ends_the_run_and_keeps_what_is_there(tmp_path)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size + 3 * size // 16, hard))
     try:
-        with pytest.raises(InputError, match="(too large|no space).*; earlier results are intact"):
+        with pytest.raises(InputError, match=r"(too large|no space).*; earlier results are intact"):
             seeds(12)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
