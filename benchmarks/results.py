@@ -19,6 +19,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import errno
+import functools
 import hashlib
 import inspect
 import io
@@ -782,6 +783,7 @@ def _metric_names() -> list[str]:
     return list(METRICS)
 
 
+@functools.cache
 def _metrics_source() -> str:
     """Hash of the source that the metrics are computed with: their modules of this project."""
     from benchmarks import metrics

@@ -582,7 +582,10 @@ def _read(folder: Path, stem: str) -> tuple[dict[str, Tensor], dict[str, Any]]:
             f"{path}: format version {version}; this parapoint reads version {FORMAT}: fit anew"
         )
     with _damage_of(folder):
-        return safetensors.torch.load((folder / facts["tensors"]).read_bytes()), facts
+        name = facts["tensors"]
+        if Path(name).name != name:
+            raise InputError(f"{path}: names tensors outside of its folder: {name!r}")
+        return safetensors.torch.load((folder / name).read_bytes()), facts
 
 
 @contextmanager
