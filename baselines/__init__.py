@@ -46,7 +46,8 @@ What a method may count on, and what it must keep:
 - Vertices may be duplicate or unreferenced, triangles thin, scales any. Arrays are read-only.
 - The result has one row of `corners` for each face, in order; a row of `uv` belongs to one place
   of the surface. Scale, rotation and mirrored charts are free.
-- Every random draw comes from `seed`.
+- Every random draw comes from `seed`: the same cell gives the same map, bit by bit, on one
+  machine. A method that cannot promise it says `deterministic: ClassVar[bool] = False`.
 - Only `parameterize` is timed: import libraries at the top of the file. One that need not be
   installed is imported by `baselines.optional.optional`, so that its rows are `skipped` and say
   what to install.

@@ -58,12 +58,15 @@ class Description:
         summary: first line of its docstring.
         requires: what a surface must be, words of `parapoint.method.REQUIREMENTS`, sorted.
         parameters: its fields and their defaults, as source text; "" for none.
+        deterministic: whether it promises the same map for the same seed: "yes", "no", or "by its
+            parameters".
     """
 
     name: str
     summary: str
     requires: tuple[str, ...]
     parameters: dict[str, str]
+    deterministic: str
 
 
 def names() -> list[str]:
@@ -141,7 +144,10 @@ def describe(name: str) -> Description:
             default = field.default if factory is MISSING else factory()
             parameters[field.name] = "" if default is MISSING else repr(default)
     summary = (kind.__doc__ or "").strip().split("\n", maxsplit=1)[0]
-    return Description(name, summary, tuple(sorted(kind.requires)), parameters)
+    promise = {True: "yes", False: "no"}.get(getattr(kind, "deterministic", True))
+    return Description(
+        name, summary, tuple(sorted(kind.requires)), parameters, promise or "by its parameters"
+    )
 
 
 def source_hash(made: Method) -> str:

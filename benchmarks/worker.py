@@ -251,8 +251,8 @@ def _outcome(job: dict[str, Any]) -> Outcome:
 
 def _measured(job: dict[str, Any]) -> Outcome:
     """Every metric of a stored map, numbers as text: JSON has no infinity."""
-    surface, result = read_surface(Path(job["surface"])), read_map(Path(job["measure"]))
-    reference = read_map(Path(job["reference"])) if job["reference"] else None
+    surface, result = read_surface(Path(job["surface"])), read_map(Path(job["uv"]))
+    reference = read_map(Path(job["reference"])) if "reference" in job else None
     assert not isinstance(reference, PointParameterization)
     values = measured(surface, result, reference)
     return {"status": "ok", "metrics": {name: repr(value) for name, value in values.items()}}

@@ -27,7 +27,8 @@ def check_method(method: Method, surface: Surface | None = None) -> None:
       `parapoint.preparation` hands it over); a method that needs faces raises on a point cloud.
     - The map has the type for the surface, is finite and not collapsed to a line, and its faces and
       corners are in the order of the mesh.
-    - The same seed gives the same map, bit by bit. The arrays of the surface do not change.
+    - The same seed gives the same map, bit by bit, unless the method says that it is not
+      `deterministic`. The arrays of the surface do not change.
     - A trace counts up in steps and seconds, and its maps are finite and of the result's shape.
 
     Args:
@@ -55,7 +56,7 @@ def check_method(method: Method, surface: Surface | None = None) -> None:
             continue
         try:
             maps = [_check_run(method, part, where) for part in preparation.parts]
-            if not checked:
+            if not checked and getattr(method, "deterministic", True):
                 _check_repeat(method, preparation.parts[0], maps[0], where)
         except UnsupportedError as error:
             refusal = error
