@@ -46,9 +46,10 @@ What a method may count on, and what it must keep:
 - The result has one row of `corners` for each face, in order; a row of `uv` belongs to one place
   of the surface. Scale, rotation and mirrored charts are free.
 - Every random draw comes from `seed`.
-- Only `parameterize` is timed: import libraries at the top of the file. One that need not be
-  installed is imported by `baselines.optional.optional`, so that its rows are `skipped` and say
-  what to install.
+- Only `parameterize` is timed: import libraries at the top of the file, and what takes seconds to
+  import or start in a method `load(self)`, which is called before the clock. One that need not be
+  installed is imported by `baselines.optional.optional`, so that its rows are `skipped`, say what
+  to install, and are tried again by the next run.
 - Raise `UnsupportedError` for what the method cannot take though `requires` admits it (`skipped`);
   any other error is a `failed` row with its message.
 - `trace` may hold energies and maps on the way; `report` what should stand beside the result.

@@ -45,6 +45,7 @@ import scipy.sparse.linalg  # noqa: F401  as above
 
 from baselines import registry
 from benchmarks.results import (
+    MISSING,
     SOURCE_CHANGED,
     arrays_hash,
     map_arrays,
@@ -55,7 +56,7 @@ from benchmarks.results import (
     trace_arrays,
     write_arrays,
 )
-from parapoint.method import UnsupportedError, prepared
+from parapoint.method import MissingError, UnsupportedError, prepared
 from parapoint.parameterization import Parameterization, PointParameterization
 from parapoint.surface import Mesh, Surface
 
@@ -220,11 +221,14 @@ def _outcome(job: dict[str, Any]) -> Outcome:
     preprocessing = ""
     try:
         surface, preprocessing = prepared(whole, method.requires)
+        if hasattr(method, "load"):
+            method.load()
         before, wall = os.times(), time.perf_counter()
         result = method.parameterize(surface, seed=job["seed"])
         wall, after = time.perf_counter() - wall, os.times()
     except UnsupportedError as error:
-        return {"status": "skipped", "reason": _line(error), "preprocessing": preprocessing}
+        reason = MISSING * isinstance(error, MissingError) + _line(error)
+        return {"status": "skipped", "reason": reason, "preprocessing": preprocessing}
     timing = {
         "preprocessing": preprocessing,
         "seconds": wall,

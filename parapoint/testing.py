@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from parapoint.cutting import cut_along
-from parapoint.method import REQUIREMENTS, Method, UnsupportedError, prepared
+from parapoint.method import REQUIREMENTS, Method, MissingError, UnsupportedError, prepared
 from parapoint.parameterization import Parameterization, PointParameterization
 from parapoint.surface import FloatArray, IntArray, Mesh, PointCloud, Surface
 
@@ -35,8 +35,8 @@ def check_method(method: Method, surface: Surface | None = None) -> None:
 
     Raises:
         AssertionError: a promise is broken; the message says which, and on which surface.
-        UnsupportedError: nothing could be checked, as the method refuses every surface (a package
-            that it needs is missing, say).
+        MissingError: a package or program that the method needs is not there.
+        UnsupportedError: nothing could be checked, as the method refuses every surface.
     """
     name = type(method).__name__
     _check_declaration(method, name)
@@ -56,6 +56,8 @@ def check_method(method: Method, surface: Surface | None = None) -> None:
             first = _check_run(method, given, where)
             if not checked:
                 _check_repeat(method, given, first, where)
+        except MissingError:
+            raise
         except UnsupportedError as error:
             refusal = error
             if checked:
