@@ -133,6 +133,21 @@ def test_equal_uv_of_one_vertex_is_no_seam(tmp_path):
     assert len(parameterization.seams(mesh)) == 0
 
 
+def test_uv_written_once_for_two_places_joins_no_charts(tmp_path):
+    # Two triangles apart in space, drawn on the same three vt lines.
+    places = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 0 0\nv 6 0 0\nv 5 1 0\n"
+    text = places + "vt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\nf 4/1 5/2 6/3\n"
+    _, parameterization = read_parameterized(saved(tmp_path, "a.obj", text))
+    assert_array_equal(parameterization.corners, [[0, 1, 2], [3, 4, 5]])
+    assert_array_equal(parameterization.uv, 2 * [[0, 0], [1, 0], [0, 1]])
+    assert_array_equal(parameterization.charts(), [0, 1])
+    # Vertices that the file doubles, as renderers need them, are one place: no seam is made of it.
+    welded = text.replace("v 5 0 0", "v 1 0 0").replace("v 6 0 0", "v 1 1 0")
+    welded = welded.replace("v 5 1 0", "v 0 1 0").replace("f 4/1 5/2 6/3", "f 4/2 5/1 6/3")
+    _, parameterization = read_parameterized(saved(tmp_path, "b.obj", welded))
+    assert_array_equal(parameterization.corners, [[0, 1, 2], [1, 3, 2]])
+
+
 def test_obj_without_faces_is_a_point_cloud(tmp_path):
     assert_array_equal(
         cloud_of(tmp_path, "a.obj", "v 1 2 3\nv 4 5 6\n").points, [[1, 2, 3], [4, 5, 6]]
