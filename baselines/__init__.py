@@ -31,8 +31,12 @@ Run it, as it is or with other parameters:
 
 Check it: `parapoint.testing.check_method(Planar())` raises at the first promise that is broken.
 
-To share it, make it a package that names it in its `pyproject.toml`; wherever the package is
-installed, `planar` is then a method like any other:
+To share it, put this `pyproject.toml` beside it; wherever the folder is installed (`pip install
+./planar`), `planar` is then a method like any other:
+
+    [project]
+    name = "planar"
+    version = "1.0"
 
     [project.entry-points."parapoint.methods"]
     planar = "planar:Planar"
