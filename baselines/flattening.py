@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import igl
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
@@ -48,9 +49,8 @@ def domain(surface: Surface) -> Domain:
         row = np.cumsum(surface.referenced) - 1
         vertices, faces, loop = vertices[surface.referenced], row[faces], row[loop]
     along = (faces == loop[0]) & (np.roll(faces, -1, axis=1) == loop[1])
-    return Domain(
-        vertices, faces, loop if along.any() else loop[::-1], float(surface.face_areas.sum())
-    )
+    area = float(igl.doublearea(vertices, faces).sum()) / 2
+    return Domain(vertices, faces, loop if along.any() else loop[::-1], area)
 
 
 def closed_holes(disk: Domain) -> tuple[FloatArray, IntArray]:
@@ -78,11 +78,8 @@ def check_triangles(vertices: FloatArray, faces: IntArray) -> None:
     Raises:
         InputError: names the first such face and their number.
     """
-    corners = vertices[faces]
-    sides = corners - np.roll(corners, 1, axis=1)
-    longest = (sides**2).sum(axis=2).max(axis=1)
-    double_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    flat = double_area <= 8 * np.finfo(np.float64).eps * longest
+    longest = igl.squared_edge_lengths(vertices, faces).max(axis=1)
+    flat = igl.doublearea(vertices, faces) <= 8 * np.finfo(np.float64).eps * longest
     if flat.any():
         raise InputError(
             f"face {int(flat.argmax())} has no area (one of {int(flat.sum())} such faces): "
