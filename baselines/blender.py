@@ -76,7 +76,8 @@ def unwrapped(
 
     Raises:
         MissingError: there is no Blender.
-        FlatteningError: Blender refused the mesh, failed, or crashed.
+        UnsupportedError: Blender's check of the mesh would change it.
+        FlatteningError: Blender failed or crashed.
     """
     process, version = _waiting.pop() if _waiting else started()
     with TemporaryDirectory() as folder:
@@ -87,6 +88,8 @@ def unwrapped(
             json.dumps(task | {"operator": operator, "options": options}) + "\n"
         )
         said = json.loads(output or "{}")
+        if "unsupported" in said:
+            raise UnsupportedError(said["unsupported"])
         if "seconds" not in said:
             raise FlatteningError(said.get("error", f"Blender ended, status {process.returncode}"))
         uv = np.load(target).astype(np.float64)
@@ -112,7 +115,7 @@ def unwrapped_disk(surface: Surface, **options: object) -> Parameterization:
 
     Raises:
         UnsupportedError: the surface is no disk, with or without holes; there is no Blender.
-        FlatteningError: Blender refused the mesh, failed, or crashed.
+        FlatteningError: Blender failed or crashed.
     """
     disk = domain(surface)
     corners, report = unwrapped(disk.vertices, disk.faces, "unwrap", **options)
@@ -203,8 +206,9 @@ class BlenderSmartProject(Waiting):
         """The atlas in the unit square.
 
         Raises:
-            UnsupportedError: the surface is a point cloud; there is no Blender.
-            FlatteningError: Blender refused the mesh, failed, or crashed.
+            UnsupportedError: the surface is a point cloud, or has two faces on the same vertices;
+                there is no Blender.
+            FlatteningError: Blender failed or crashed.
         """
         if not isinstance(surface, Mesh):
             raise UnsupportedError("needs faces; the surface is a point cloud")

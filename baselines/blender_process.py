@@ -11,7 +11,7 @@ import time
 
 
 def main() -> None:
-    """Say {"blender": version} or {"missing": why}, then {"seconds": time} or {"error": what}."""
+    """Say {"blender": version} or {"missing": why}, then {"seconds": time}, {"unsupported": why}, {"error": what}."""
     # Blender prints to standard output; the answers go where it cannot follow.
     answers = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)
@@ -25,6 +25,8 @@ def main() -> None:
     if line:
         try:
             answer: dict[str, object] = {"seconds": unwrap(**json.loads(line))}
+        except ValueError as error:
+            answer = {"unsupported": str(error)}
         except Exception as error:  # noqa: BLE001 (whatever Blender raises is the answer)
             answer = {"error": " ".join(str(error).split())}
         answers.write(json.dumps(answer) + "\n")

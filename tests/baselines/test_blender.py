@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from baselines import blender, registry
 from baselines.flattening import FlatteningError
 from parapoint.errors import InputError
-from parapoint.method import MissingError
+from parapoint.method import MissingError, UnsupportedError
 from parapoint.surface import Mesh
 from parapoint.testing import irregular_disk, sphere
 
@@ -123,6 +123,12 @@ def test_failure_of_blender_is_one_of_the_method(stand_in, text, fault):
         mapped("blender_smart_project", irregular_disk())
 
 
+def test_mesh_that_blender_does_not_take_is_skipped(stand_in):
+    stand_in(STAND_IN.format(body="raise SystemExit(print(json.dumps({'unsupported': 'two'})))"))
+    with pytest.raises(UnsupportedError, match="^two$"):
+        mapped("blender_smart_project", irregular_disk())
+
+
 @pytest.mark.parametrize("name", METHODS)
 def test_without_blender_it_is_said_how_to_get_it(name, monkeypatch):
     method = registry.method(name)[1]
@@ -156,5 +162,5 @@ def test_blender_itself_flattens_a_flat_mesh_without_distortion():
         assert_allclose(*lengths, rtol=2e-3)  # float32, and ABF++ ends its steps early
     assert len(np.unique(mapped("blender_smart_project", sphere()).charts())) > 1
     twice = Mesh(flat.vertices, np.concatenate([flat.faces, flat.faces[:1]]))
-    with pytest.raises(FlatteningError, match="two faces on the same vertices"):
+    with pytest.raises(UnsupportedError, match="two faces on the same vertices"):
         mapped("blender_smart_project", twice)
