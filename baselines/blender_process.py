@@ -11,7 +11,7 @@ import time
 
 
 def main() -> None:
-    """Say {"blender": version} or {"missing": why}, then {"seconds": time}, {"unsupported": why}, {"error": what}."""
+    """Say {"blender": version} or {"missing": why}, do the task, say how it went."""
     # Blender prints to standard output; the answers go where it cannot follow.
     answers = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)
