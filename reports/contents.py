@@ -16,6 +16,10 @@ from benchmarks.metrics import METRICS
 from benchmarks.results import ResultRow, Store
 from benchmarks.suites import SUITES
 from parapoint.errors import InputError
+from parapoint.surface import Mesh
+
+ANGLE, AREA = "angle_difference_mean", "area_discrepancy_total"
+FLIPPED, SPANNING = "flipped_fraction", "spanning_fraction"
 
 DISPLAY: dict[str, tuple[str, str]] = {
     "tutte": ("Tutte", "uniform weights"),
@@ -194,6 +198,17 @@ class Contents:
         """The row whose map stands for a model and a method in figures: the first seed's, if ok."""
         good = [row for row in self.cell(case, label) if row.status == "ok"]
         return min(good, key=lambda row: row.seed) if good else None
+
+    def mesh(self, case: str) -> Mesh | None:
+        """The mesh of a model, None where it is not stored or no mesh."""
+        for row in self.rows:
+            if row.case == case and row.surface_hash:
+                try:
+                    surface = self.store.surface(row)
+                except InputError:
+                    return None
+                return surface if isinstance(surface, Mesh) else None
+        return None
 
     @cached_property
     def atlases(self) -> frozenset[str]:

@@ -21,7 +21,7 @@ from benchmarks.results import (
 )
 from parapoint.parameterization import Parameterization, TracePoint
 from parapoint.surface import Mesh
-from reports import figures, pictures, render
+from reports import pictures, render, style
 from reports.report import write
 
 HAND, DEVIL, NEFERTITI = "hand_1_i_f5000", "mannequin-devil", "nefertiti-lowres_odedstein"
@@ -95,7 +95,7 @@ def draw_small(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(pictures, "SIZE", 48)
     patch.setattr(render, "OCCLUSION_RAYS", 0)
     patch.setattr(render, "FINE_FACES", 0)
-    patch.setitem(figures.STYLE, "savefig.dpi", 40)
+    patch.setitem(style.STYLE, "savefig.dpi", 40)
 
 
 @pytest.fixture(autouse=True)

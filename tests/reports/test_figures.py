@@ -5,9 +5,11 @@ import numpy as np
 import pytest
 from matplotlib.text import Text
 
-from reports import figures
+from reports import figures, galleries, plots
 from reports.contents import contents
-from reports.figures import draw, drawings, leading, look, plain_log, write
+from reports.figures import draw, drawings, write
+from reports.galleries import leading
+from reports.style import figure, look, plain_log
 
 from .conftest import HAND, NEFERTITI, Writer, flat, sheet
 
@@ -61,7 +63,7 @@ def test_the_same_results_give_the_same_bytes(suite, tmp_path):
 
 def test_the_supplements_figure_shows_slim_isometric_beside_parapoint(suite, tmp_path):
     assert leading(suite, "slim").short == "SLIM symmetric Dirichlet"
-    found = texts(figures.disks(suite, tmp_path))
+    found = texts(galleries.disks(suite, tmp_path))
     assert "SLIM: UV" in found
     assert "ParaPoint: view 2" in found
     assert not any(NEFERTITI in text for text in found)
@@ -69,13 +71,13 @@ def test_the_supplements_figure_shows_slim_isometric_beside_parapoint(suite, tmp
 
 
 def test_the_closed_models_figure_says_what_cut_it_and_why_a_map_is_missing(suite, tmp_path):
-    found = texts(figures.cut_model(suite, NEFERTITI, tmp_path))
+    found = texts(galleries.cut_model(suite, NEFERTITI, tmp_path))
     assert "skipped" in found
     assert any(text.startswith("(c) ParaPoint") for text in found)
 
 
 def test_convergence_draws_the_quality_along_the_way(suite):
-    made = figures.convergence(suite)
+    made = plots.convergence(suite)
     panel = next(place for place in made.axes if place.get_title() == HAND)
     lines = {line.get_label(): line for line in panel.get_lines()}
     seconds, angles = lines["SLIM symmetric Dirichlet"].get_data()
@@ -87,7 +89,7 @@ def test_convergence_draws_the_quality_along_the_way(suite):
 
 
 def test_losses_are_those_of_the_trace(suite):
-    made = figures.losses(suite)
+    made = plots.losses(suite)
     assert [place.get_title() for place in made.axes] == [HAND, "mannequin-devil"]
     lines = {line.get_label(): line for line in made.axes[0].get_lines()}
     np.testing.assert_allclose(lines["total"].get_ydata(), [1, 1 / 2, 1 / 3])
@@ -99,7 +101,7 @@ def test_singular_values_of_an_isometry_peak_at_one(tmp_path):
     writer = Writer(tmp_path)
     with writer.store.writing():
         writer.cell(HAND, plane, "lscm", {}, result=flat(plane))
-    made = figures.singular_values(contents(tmp_path)[0])
+    made = plots.singular_values(contents(tmp_path)[0])
     first = made.axes[0].get_lines()[0]
     assert first.get_ydata().max() == pytest.approx(1.0)
     assert abs(first.get_xdata()[first.get_ydata().argmax()]) < 0.2
@@ -128,7 +130,7 @@ def test_a_figure_can_be_made_in_another_process(suite, tmp_path):
 
 
 def test_log_axes_have_plain_numbers():
-    made = figures.figure(2, 2)
+    made = figure(2, 2)
     place = made.add_subplot()
     place.plot([1, 2], [0.004, 30])
     place.set_yscale("log")

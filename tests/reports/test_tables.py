@@ -8,20 +8,9 @@ import subprocess
 import pytest
 
 from reports.contents import contents
-from reports.tables import (
-    Column,
-    Table,
-    comma_separated,
-    comparison,
-    conformality,
-    everything,
-    failures,
-    latex,
-    latex_text,
-    markdown,
-    supplement,
-    tables,
-)
+from reports.formats import comma_separated, latex, latex_text, markdown
+from reports.table import Column, Table
+from reports.tables import comparison, conformality, everything, failures, supplement, tables
 
 from .conftest import DEVIL, HAND, HOSTILE, NEFERTITI
 

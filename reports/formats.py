@@ -1,0 +1,148 @@
+"""How a table is written: LaTeX, Markdown and CSV."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from reports.table import Cell, Table, grouped
+
+
+def write(made: Sequence[Table], folder: Path) -> None:
+    """Write each table to `folder` as LaTeX, Markdown and CSV."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for table in made:
+        (folder / f"{table.name}.tex").write_text(latex(table), encoding="utf-8")
+        (folder / f"{table.name}.md").write_text(markdown(table), encoding="utf-8")
+        (folder / f"{table.name}.csv").write_text(comma_separated(table), encoding="utf-8")
+
+
+_LATEX = {
+    "\\": r"\textbackslash{}",
+    "&": r"\&",
+    "%": r"\%",
+    "$": r"\$",
+    "#": r"\#",
+    "_": r"\_",
+    "{": r"\{",
+    "}": r"\}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "<": r"$<$",
+    ">": r"$>$",
+    "|": r"$|$",
+    "↓": r"$\downarrow$",
+    "↑": r"$\uparrow$",
+    "∞": r"$\infty$",
+    "−": r"$-$",
+    "–": "--",
+    "±": r"$\pm$",
+    "·": r"$\cdot$",
+    "×": r"$\times$",
+    "≤": r"$\leq$",
+    "σ": r"$\sigma$",
+    "“": "``",
+    "”": "''",
+}
+
+
+def latex_text(text: str) -> str:
+    """`text` with every character that LaTeX reads otherwise escaped; others outside ASCII as ?."""
+    text = " ".join(text.split())
+    pieces = re.split(r"(·10\^−?\d+)", text)
+    return "".join(
+        rf"$\cdot 10^{{{piece[4:].replace('−', '-')}}}$"
+        if re.fullmatch(r"·10\^−?\d+", piece)
+        else "".join(_LATEX.get(c, c if c.isascii() and c.isprintable() else "?") for c in piece)
+        for piece in pieces
+    )
+
+
+def latex(table: Table) -> str:
+    """The table as a LaTeX float; needs the packages booktabs and graphicx."""
+    columns = table.columns
+    lines = [
+        "% needs \\usepackage{booktabs,graphicx}",
+        r"\begin{table}[t]",
+        r"\centering",
+        rf"\caption{{{latex_text(table.caption)}}}",
+        rf"\label{{tab:{table.name}}}",
+        r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%",
+        r"\begin{tabular}{" + "".join("l" if column.text else "r" for column in columns) + "}",
+        r"\toprule",
+    ]
+    groups = grouped(columns)
+    if any(name for name, _ in groups):
+        heads, rules, at = [], [], 1
+        for name, width in groups:
+            heads.append(rf"\multicolumn{{{width}}}{{c}}{{{latex_text(name)}}}" if name else "")
+            heads.extend([""] * (width - 1) if not name else [])
+            if name:
+                rules.append(rf"\cmidrule(lr){{{at}-{at + width - 1}}}")
+            at += width
+        lines += [" & ".join(heads) + r" \\", " ".join(rules)]
+    lines.append(" & ".join(latex_text(column.head) for column in columns) + r" \\")
+    for block in table.cells:
+        lines.append(r"\midrule")
+        for number, row in enumerate(block):
+            cells = [
+                "" if number and column.once else _latex_cell(cell)
+                for column, cell in zip(columns, row, strict=True)
+            ]
+            lines.append(" & ".join(cells) + r" \\")
+    lines += [r"\bottomrule", r"\end{tabular}}"]
+    if table.notes:
+        notes = r" \\ ".join(latex_text(note) for note in table.notes)
+        lines.append(rf"\par\smallskip\parbox{{\linewidth}}{{\footnotesize {notes}}}")
+    return "\n".join([*lines, r"\end{table}", ""])
+
+
+def _latex_cell(cell: Cell) -> str:
+    text = latex_text(cell.text)
+    return {"best": rf"\textbf{{{text}}}", "second": rf"\underline{{{text}}}"}.get(cell.mark, text)
+
+
+def markdown(table: Table) -> str:
+    """The table as Markdown; best in bold, second in italics."""
+
+    def escaped(text: str) -> str:
+        return re.sub(r"([\\`*_{}\[\]<>|#])", r"\\\1", " ".join(text.split()))
+
+    heads = [
+        f"{column.group}: {column.head}" if column.group else column.head
+        for column in table.columns
+    ]
+    lines = [
+        f"### {escaped(table.title)}",
+        "",
+        "| " + " | ".join(escaped(head) for head in heads) + " |",
+        "|" + "|".join(":---" if column.text else "---:" for column in table.columns) + "|",
+    ]
+    around = {"best": "**", "second": "*", "": ""}
+    for block in table.cells:
+        for number, row in enumerate(block):
+            cells = [
+                ""
+                if number and column.once
+                else f"{around[cell.mark]}{escaped(cell.text)}{around[cell.mark]}"
+                for column, cell in zip(table.columns, row, strict=True)
+            ]
+            lines.append("| " + " | ".join(cells) + " |")
+    lines += ["", escaped(table.caption), ""]
+    lines += [line for note in table.notes for line in (f"- {escaped(note)}",)]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def comma_separated(table: Table) -> str:
+    """The table as CSV: keys as heads, numbers in full, every row complete."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow([column.key for column in table.columns])
+    for block in table.blocks:
+        for row in block:
+            values = [row.get(column.key) for column in table.columns]
+            writer.writerow(["" if value is None else value for value in values])
+    return out.getvalue()

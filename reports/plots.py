@@ -1,0 +1,240 @@
+"""The figures that are plots: distortion against distortion, time and size; losses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from benchmarks.distortion import (
+    angle_difference_mean,
+    area_discrepancy_total,
+    face_distortion,
+    triangles,
+)
+from benchmarks.metrics import MapState
+from benchmarks.results import ResultRow
+from parapoint.errors import InputError
+from parapoint.parameterization import Parameterization
+from parapoint.surface import Mesh
+from reports.contents import ANGLE, AREA, Contents, Label
+from reports.galleries import leading
+from reports.style import COLOURS, DASHES, legend_below, look, plain_log, small_multiples
+
+
+def losses(contents: Contents) -> Figure | None:
+    """Loss terms of ParaPoint against iterations, model by model."""
+    label = leading(contents, "parapoint")
+    traces = {}
+    for case in contents.cases:
+        row = contents.shown(case, label) if label else None
+        found = trace_of(contents, row) if row else pd.DataFrame()
+        if len(found) > 1:
+            traces[case] = found
+    if not traces:
+        return None
+    made, places = small_multiples(len(traces))
+    names = list(dict.fromkeys(name for found in traces.values() for name in found.columns))
+    names = [name for name in names if name not in {"iteration", "seconds"}]
+    for place, (case, found) in zip(places, traces.items(), strict=True):
+        for number, name in enumerate(names):
+            if name in found and (found[name] > 0).any():
+                known = found[found[name] > 0]
+                total = name in {"total", "loss"}
+                place.plot(
+                    known["iteration"],
+                    known[name],
+                    label=name.replace("_", " "),
+                    color="0.1" if total else COLOURS[number % len(COLOURS)],
+                    linestyle="-" if total else DASHES[number % len(DASHES)],
+                    linewidth=1.6 if total else 1.1,
+                )
+        place.set_yscale("log")
+        place.set_title(case)
+        place.set_xlabel("iteration")
+    places[0].set_ylabel("loss term")
+    legend_below(made, places)
+    return made
+
+
+def trace_of(contents: Contents, row: ResultRow) -> pd.DataFrame:
+    """The trace of a cell as a table: iteration, seconds, values by name; empty without one."""
+    try:
+        result = contents.store.result(row)
+    except InputError:
+        return pd.DataFrame()
+    return pd.DataFrame(
+        [
+            {"iteration": iteration, "seconds": seconds, **values}
+            for iteration, seconds, values, _ in result.trace
+        ]
+    )
+
+
+def quality_trace(contents: Contents, row: ResultRow) -> pd.DataFrame:
+    """Angle and area distortion over all faces along the way, where the maps were kept."""
+    try:
+        result, surface = contents.store.result(row), contents.store.surface(row)
+    except InputError:
+        return pd.DataFrame()
+    if not isinstance(result, Parameterization) or not isinstance(surface, Mesh):
+        return pd.DataFrame()
+    records = []
+    for at in result.trace:
+        if at.uv is not None and len(at.uv) == len(result.uv):
+            faces = triangles(surface, Parameterization(at.uv, result.corners))
+            found = face_distortion(faces)
+            records.append(
+                {
+                    "seconds": at.seconds,
+                    "angle": angle_difference_mean(found),
+                    "area": area_discrepancy_total(found),
+                }
+            )
+    return pd.DataFrame(records)
+
+
+def convergence(contents: Contents) -> Figure | None:
+    """Angle distortion against time for every method with a trace; others as a single point."""
+    return _convergence(contents, "angle", ANGLE, "angle difference [rad]")
+
+
+def area_convergence(contents: Contents) -> Figure | None:
+    """Area distortion against time, likewise."""
+    return _convergence(contents, "area", AREA, "area discrepancy")
+
+
+def _convergence(contents: Contents, name: str, metric: str, title: str) -> Figure | None:
+    curves: dict[str, list[tuple[Label, pd.DataFrame]]] = {}
+    traced = False
+    for case in contents.cases:
+        for label in contents.methods:
+            row = contents.shown(case, label)
+            if row is None or row.seconds is None:
+                continue
+            found = quality_trace(contents, row)
+            traced |= len(found) > 1
+            if len(found) < 2:
+                value = contents.measured.loc[contents.measured["id"] == row.id, metric]
+                found = pd.DataFrame({"seconds": [row.seconds], name: [float(value.iloc[0])]})
+            curves.setdefault(case, []).append((label, found))
+    if not traced:
+        return None
+    made, places = small_multiples(len(curves))
+    for place, (case, lines) in zip(places, curves.items(), strict=True):
+        for label, found in lines:
+            known = found[np.isfinite(found[name]) & (found["seconds"] > 0)]
+            place.plot(
+                known["seconds"], known[name], label=label.short, markersize=3.5,
+                **look(contents, label),
+            )  # fmt: skip
+        place.set_xscale("log")
+        plain_log(place.xaxis)
+        if name == "angle":
+            place.set_yscale("log")
+            plain_log(place.yaxis)
+        place.set_title(case)
+        place.set_xlabel("seconds")
+    places[0].set_ylabel(title)
+    legend_below(made, places)
+    return made
+
+
+def pareto(contents: Contents) -> Figure | None:
+    """Angle against area distortion, model by model: nearer to the lower left is better."""
+    good = contents.means[contents.means["ok"] > 0]
+    good = good[np.isfinite(good[ANGLE]) & np.isfinite(good[AREA])]
+    cases = [case for case in contents.cases if (good["case"] == case).any()]
+    if not cases:
+        return None
+    made, places = small_multiples(len(cases))
+    for place, case in zip(places, cases, strict=True):
+        own = good[good["case"] == case].set_index("label")
+        for label in contents.methods:
+            if label.short in own.index:
+                record = own.loc[label.short]
+                style = look(contents, label) | {"linestyle": "none", "markersize": 6.5}
+                if label.short in contents.atlases:
+                    style |= {"markerfacecolor": "none", "markeredgecolor": style["color"]}
+                else:
+                    style |= {"markeredgecolor": "white", "markeredgewidth": 0.5}
+                at = [max(float(record[AREA]), 1e-4)], [max(float(record[ANGLE]), 1e-6)]
+                place.plot(*at, label=label.short, **style)
+        own = own[~own.index.isin(contents.atlases)]
+        points = own[[AREA, ANGLE]].clip(lower=[1e-4, 1e-6]).sort_values(AREA).to_numpy(dtype=float)
+        best = np.minimum.accumulate(points[:, 1])
+        place.step(points[:, 0], best, where="post", color="0.6", linewidth=0.8, zorder=1)
+        place.set_yscale("log")
+        plain_log(place.yaxis)
+        place.set_xlim(left=0)
+        place.set_title(case)
+        place.set_xlabel("area discrepancy")
+    places[0].set_ylabel("angle difference [rad]")
+    legend_below(made, places)
+    return made
+
+
+def singular_values(contents: Contents) -> Figure | None:
+    """How much of the surface is stretched by how much: both singular values, all methods."""
+    cases = [case for case in contents.cases if contents.mesh(case) is not None]
+    cases = [case for case in cases if any(contents.shown(case, m) for m in contents.methods)]
+    if not cases:
+        return None
+    made, places = small_multiples(len(cases))
+    bins = np.linspace(-5, 5, 61)
+    middle = (bins[1:] + bins[:-1]) / 2
+    for place, case in zip(places, cases, strict=True):
+        surface = contents.mesh(case)
+        assert surface is not None
+        for label in contents.methods:
+            row = contents.shown(case, label)
+            if row is None:
+                continue
+            try:
+                result = contents.store.result(row)
+            except InputError:
+                continue
+            if not isinstance(result, Parameterization):
+                continue
+            found = MapState(surface, result).distortion_without_spanning
+            style = look(contents, label) | {"marker": "", "linewidth": 1.0}
+            for sigma in (found.sigma1, found.sigma2):
+                known = found.finite & (sigma > 0)
+                at = np.clip(np.log2(sigma[known]), -5, 5)
+                share, _ = np.histogram(at, bins, weights=found.area[known])
+                shown = label.short if sigma is found.sigma1 else None
+                place.plot(middle, share, label=shown, **style)
+        place.axvline(0, color="0.5", linewidth=0.6)
+        place.set_yscale("log")
+        place.set_ylim(1e-3, 1.3)
+        place.set_xticks([-4, -2, 0, 2, 4], ["1/16", "1/4", "1", "4", "16"])
+        place.set_title(case)
+        place.set_xlabel(r"$\sigma_1$, $\sigma_2$")
+    places[0].set_ylabel("share of the area")
+    legend_below(made, places)
+    return made
+
+
+def cost(contents: Contents) -> Figure | None:
+    """Time against the number of faces for every method."""
+    surfaces = {case: contents.mesh(case) for case in contents.cases}
+    sizes = {case: len(mesh.faces) for case, mesh in surfaces.items() if mesh is not None}
+    if len(set(sizes.values())) < 2:
+        return None
+    made, places = small_multiples(1, height=3.0)
+    place = places[0]
+    for label in contents.methods:
+        rows = [contents.shown(case, label) for case in sizes]
+        points = sorted((sizes[row.case], row.seconds) for row in rows if row and row.seconds)
+        if points:
+            place.plot(
+                *zip(*points, strict=True), label=label.short, markersize=4, **look(contents, label)
+            )
+    place.set_xscale("log")
+    place.set_yscale("log")
+    plain_log(place.xaxis)
+    plain_log(place.yaxis)
+    place.set_xlabel("faces")
+    place.set_ylabel("seconds")
+    legend_below(made, places)
+    return made
