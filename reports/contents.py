@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -250,6 +251,22 @@ class Contents:
         numbers = ["seconds", *METRICS]
         return frame.astype(dict.fromkeys(numbers, "float64"))
 
+    @cached_property
+    def records(self) -> dict[tuple[str, str], dict[str, Any]]:
+        """The rows of `means` by (case, label)."""
+        return {
+            (record["case"], record["label"]): {str(k): v for k, v in record.items()}
+            for record in self.means.to_dict("records")
+        }
+
+
+def number(record: Mapping[str, object] | None, name: str) -> float | None:
+    """The value of a metric in a row of `Contents.means`, or None where there is none."""
+    value = record.get(name) if record else None
+    if not isinstance(value, int | float) or math.isnan(value):
+        return None
+    return float(value)
+
 
 def contents(folder: Path) -> list[Contents]:
     """What `folder` holds, suite by suite.
@@ -278,5 +295,7 @@ def contents(folder: Path) -> list[Contents]:
             label=part["id"].map(lambda key, by_id=by_id: by_id[key].short),
             seconds=part["id"].map(seconds).astype("float64"),
         )
+        # A learned seam that faces span has no edges: 0 would read, and rank, as no seam at all.
+        part.loc[part[SPANNING] > 0, ["seam_length", "seam_excess"]] = math.nan
         found.append(Contents(store, suite, own, by_id, part))
     return found

@@ -1,23 +1,25 @@
-"""How a table is written: LaTeX, Markdown and CSV."""
+"""How a table is written: LaTeX, Markdown, CSV and HTML."""
 
 from __future__ import annotations
 
 import csv
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from html import escape
 from pathlib import Path
 
 from reports.table import Cell, Table, grouped
 
 
 def write(made: Sequence[Table], folder: Path) -> None:
-    """Write each table to `folder` as LaTeX, Markdown and CSV."""
+    """Write each table to `folder` as LaTeX, Markdown, CSV and HTML."""
     folder.mkdir(parents=True, exist_ok=True)
     for table in made:
         (folder / f"{table.name}.tex").write_text(latex(table), encoding="utf-8")
         (folder / f"{table.name}.md").write_text(markdown(table), encoding="utf-8")
         (folder / f"{table.name}.csv").write_text(comma_separated(table), encoding="utf-8")
+        (folder / f"{table.name}.html").write_text(html(table.title, [table]), encoding="utf-8")
 
 
 _LATEX = {
@@ -146,3 +148,63 @@ def comma_separated(table: Table) -> str:
             values = [row.get(column.key) for column in table.columns]
             writer.writerow(["" if value is None else value for value in values])
     return out.getvalue()
+
+
+_CSS = """
+:root { color-scheme: light dark }
+body { font: 16px/1.45 Charter, Palatino, Georgia, serif; margin: 2rem auto; max-width: 84rem;
+  padding: 0 1.5rem }
+.scroll { overflow-x: auto }
+table { border-collapse: collapse; border-block: 1.5px solid; font-variant-numeric: tabular-nums }
+tbody { border-top: 1px solid }
+th, td { padding: .2rem .6rem; text-align: right; vertical-align: baseline; white-space: nowrap }
+th { font-weight: 400; vertical-align: bottom }
+th[colspan] { text-align: center }
+.text { text-align: left }
+.best { font-weight: 700 }
+.second { text-decoration: underline }
+p, ul { max-width: 52rem; font-size: .92rem }
+"""
+
+
+def html(title: str, tables: Sequence[Table], lead: str = "") -> str:
+    """A page of tables that needs no other file, `lead` below its heading."""
+    lines = [
+        '<!doctype html>\n<html lang="en">\n<meta charset="utf-8">',
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        f"<title>{escape(title)}</title>\n<style>{_CSS}</style>",
+        f"<h1>{escape(title)}</h1>",
+        *([f"<p>{escape(lead)}</p>"] if lead else []),
+    ]
+    for table in tables:
+        if table.title != title:
+            lines.append(f"<h2>{escape(table.title)}</h2>")
+        lines += _html_table(table)
+    return "\n".join(lines) + "\n</html>\n"
+
+
+def _html_table(table: Table) -> Iterator[str]:
+    """The lines of a table, its caption and its notes."""
+    yield '<div class="scroll"><table>\n<thead>'
+    groups = grouped(table.columns)
+    if any(name for name, _ in groups):
+        heads = (f'<th colspan="{width}" scope="colgroup">{escape(name)}' for name, width in groups)
+        yield f"<tr>{''.join(heads)}"
+    classes = ["text" if column.text else "" for column in table.columns]
+    heads = (
+        f'<th class="{kind}" scope="col">{escape(column.head)}'
+        for kind, column in zip(classes, table.columns, strict=True)
+    )
+    yield f"<tr>{''.join(heads)}"
+    for block in table.cells:
+        yield "<tbody>"
+        for number, row in enumerate(block):
+            cells = (
+                f'<td class="{kind} {cell.mark}">'
+                f"{'' if number and column.once else escape(cell.text)}"
+                for kind, column, cell in zip(classes, table.columns, row, strict=True)
+            )
+            yield f"<tr>{''.join(cells)}"
+    yield f"</table></div>\n<p>{escape(table.caption)}</p>"
+    if table.notes:
+        yield f"<ul>{''.join(f'<li>{escape(note)}' for note in table.notes)}</ul>"

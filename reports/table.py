@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal, NamedTuple
 
+from benchmarks.metrics import METRICS
+
 Value = float | str | None
 Mark = Literal["", "best", "second"]
 
@@ -154,3 +156,26 @@ def grouped(columns: Sequence[Column]) -> list[tuple[str, int]]:
         else:
             groups.append((column.group, 1))
     return groups
+
+
+def metric_column(name: str, title: str = "", **given: object) -> Column:
+    """The column of a metric; `seconds` counts as one."""
+    if name == "seconds":
+        return Column("seconds", title or "time [s]", better="lower", digits=2)
+    metric = METRICS[name]
+    digits = 4 if metric.unit == "radians" else 3
+    column = Column(
+        name,
+        title or metric.label,
+        better=metric.better if metric.better in ARROWS else "",
+        digits=2 if name.endswith("_fraction") else digits,
+        percent=name.endswith("_fraction"),
+    )
+    return Column(**{**column.__dict__, **given})
+
+
+def metric_title(name: str) -> str:
+    """Label and unit of a metric; `seconds` counts as one."""
+    column = metric_column(name)
+    unit = "" if name == "seconds" or not METRICS[name].unit else f" [{METRICS[name].unit}]"
+    return f"{column.title}{' %' if column.percent else unit}"

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
-from benchmarks.metrics import METRICS
-from reports.contents import ANGLE, AREA, FLIPPED, SPANNING, Contents
+from reports.contents import ANGLE, AREA, FLIPPED, SPANNING, Contents, number
+from reports.notes import environment_note, failure_notes, method_notes
 from reports.published import AUTHORS, Verdict, claim_text, published_values, verdicts
-from reports.table import ARROWS, Column, Table, Value
+from reports.studies import ablation, cuts, paired_tests, seed_variance, success
+from reports.table import Column, Table, Value, metric_column, metric_title
 
 SUMMARY_METRICS = (
     ANGLE,
@@ -27,80 +27,8 @@ SUMMARY_METRICS = (
 """The metrics of the printed comparison; its CSV has them all."""
 
 
-def environment_note(contents: Contents) -> str:
-    """Where the numbers come from: machine, commit, versions, seeds."""
-    runs = contents.store.environment()["runs"]
-    used = {row.run for row in contents.rows}
-    said = []
-    for number, run in enumerate(runs):
-        if number not in used or not isinstance(run, Mapping):
-            continue
-        commit = str(run.get("commit") or "unknown")[:12]
-        changed = " with local changes" if run.get("dirty") else ""
-        said.append(
-            f"commit {commit}{changed}, {run.get('cpu') or 'unknown processor'}, "
-            f"{run.get('cores', '?')} cores, Python {run.get('python', '?')}"
-        )
-    seeds = sorted({row.seed for row in contents.rows})
-    places = "; ".join(dict.fromkeys(said)) or "environment not recorded"
-    return f"Run on: {places}. Seeds: {', '.join(map(str, seeds))}."
-
-
-def method_notes(contents: Contents) -> list[str]:
-    """What was done to a surface before a method saw it, and which methods are no rivals."""
-    notes = []
-    if contents.atlases:
-        notes.append(
-            f"Not ranked: {', '.join(sorted(contents.atlases))}, which cut the surface into many "
-            "charts; the others give one map of the whole."
-        )
-    steps: dict[str, set[str]] = {}
-    for row in contents.rows:
-        if row.preprocessing:
-            steps.setdefault(row.preprocessing, set()).add(row.case)
-    for step, cases in steps.items():
-        notes.append(
-            f"{step.capitalize()}, the same for every method that needs one: "
-            f"{', '.join(sorted(cases))}."
-        )
-    return notes
-
-
-def _metric(name: str, title: str = "", **given: object) -> Column:
-    """The column of a metric; `seconds` counts as one."""
-    if name == "seconds":
-        return Column("seconds", title or "time [s]", better="lower", digits=2)
-    metric = METRICS[name]
-    digits = 4 if metric.unit == "radians" else 3
-    column = Column(
-        name,
-        title or metric.label,
-        better=metric.better if metric.better in ARROWS else "",
-        digits=2 if name.endswith("_fraction") else digits,
-        percent=name.endswith("_fraction"),
-    )
-    return Column(**{**column.__dict__, **given})
-
-
-def _measured(record: Mapping[str, object] | None, name: str) -> Value:
-    """The value of a metric in a row of `Contents.means`, or None where there is none."""
-    value = record.get(name) if record else None
-    if not isinstance(value, int | float) or math.isnan(value):
-        return None
-    return float(value)
-
-
-def _records(contents: Contents) -> dict[tuple[str, str], dict[str, object]]:
-    """The rows of `contents.means` by (case, label)."""
-    return {
-        (str(record["case"]), str(record["label"])): {str(k): v for k, v in record.items()}
-        for record in contents.means.to_dict("records")
-    }
-
-
 def conformality(contents: Contents) -> Table:
     """The supplement's table: models × methods, published figures in columns of their own."""
-    records = _records(contents)
     columns = [Column("case", "Model", text=True)]
     columns += [
         Column(label.short, label.short, better="lower", digits=4, group="Measured here")
@@ -121,8 +49,8 @@ def conformality(contents: Contents) -> Table:
     for case in contents.cases:
         row: dict[str, Value] = {"case": case, "claim": claim_text(case)}
         for label in contents.methods:
-            record = records.get((case, label.short))
-            value = _measured(record, ANGLE)
+            record = contents.records.get((case, label.short))
+            value = number(record, ANGLE)
             status = str(record["status"]).replace("_", " ") if record else ""
             row[label.short] = value if value is not None else (status if status != "ok" else "")
         for author, value in published_values(case).items():
@@ -169,7 +97,6 @@ def _published_notes(authors: Sequence[str]) -> list[str]:
 
 def supplement(contents: Contents) -> Table:
     """Each model's methods with angle distortion, area distortion, flips and spanning faces."""
-    records = _records(contents)
     judged: dict[tuple[str, str], Verdict] = {
         (verdict.case, verdict.label.short): verdict for verdict in verdicts(contents)
     }
@@ -178,15 +105,15 @@ def supplement(contents: Contents) -> Table:
     columns = [
         Column("case", "Model", text=True, once=True),
         Column("method", "Method", text=True),
-        _metric(ANGLE, "all faces", group="Angle difference [rad]"),
-        _metric(without, "no spanning", group="Angle difference [rad]"),
-        _metric(AREA, "all faces", group="Area discrepancy [0–2]"),
-        _metric(area_without, "no spanning", group="Area discrepancy [0–2]"),
-        _metric(FLIPPED, "flipped %"),
+        metric_column(ANGLE, "all faces", group="Angle difference [rad]"),
+        metric_column(without, "no spanning", group="Angle difference [rad]"),
+        metric_column(AREA, "all faces", group="Area discrepancy [0–2]"),
+        metric_column(area_without, "no spanning", group="Area discrepancy [0–2]"),
+        metric_column(FLIPPED, "flipped %"),
         Column(SPANNING, "spanning %", digits=2, percent=True),
         Column("chart_count", "charts", digits=0),
         Column("seam_length", "seam", digits=2),
-        _metric("seconds"),
+        metric_column("seconds"),
         Column("done", "ok", text=True),
     ]
     authors = [
@@ -204,7 +131,7 @@ def supplement(contents: Contents) -> Table:
     for case in contents.cases:
         rows: list[dict[str, Value]] = []
         for label in contents.methods:
-            record = records.get((case, label.short))
+            record = contents.records.get((case, label.short))
             if record is None:
                 continue
             cut = " + automatic cut" if record["preprocessing"] else ""
@@ -212,15 +139,12 @@ def supplement(contents: Contents) -> Table:
                 "case": f"{case} ({claim_text(case)})" if authors else case,
                 "method": label.text + cut,
                 **{
-                    name: _measured(record, name)
+                    name: number(record, name)
                     for name in (ANGLE, without, AREA, area_without, FLIPPED)
                 },
                 "label": label.short,
-                **{
-                    name: _measured(record, name)
-                    for name in (SPANNING, "chart_count", "seam_length")
-                },
-                "seconds": _measured(record, "seconds"),
+                **{name: number(record, name) for name in (SPANNING, "chart_count", "seam_length")},
+                "seconds": number(record, "seconds"),
                 "done": f"{record['ok']}/{record['tried']}" if record["tried"] else "skipped",
             }
             if record["status"] != "ok":
@@ -247,23 +171,10 @@ def supplement(contents: Contents) -> Table:
         notes=(
             *method_notes(contents),
             *_published_notes(authors),
-            *_failure_notes(contents),
+            *failure_notes(contents),
             environment_note(contents),
         ),
     )
-
-
-def _failure_notes(contents: Contents) -> list[str]:
-    """One line a way in which cells did not end well."""
-    reasons: dict[tuple[str, str, str], list[str]] = {}
-    for row in contents.rows:
-        if row.status != "ok":
-            key = (contents.labels[row.id].short, row.status.replace("_", " "), row.reason)
-            reasons.setdefault(key, []).append(row.case)
-    return [
-        f"{method} {status} on {', '.join(dict.fromkeys(cases))}: {reason or 'no reason given'}."
-        for (method, status, reason), cases in reasons.items()
-    ]
 
 
 def comparison(contents: Contents, names: Sequence[str] = ()) -> Table:
@@ -285,7 +196,7 @@ def comparison(contents: Contents, names: Sequence[str] = ()) -> Table:
         if name not in means.columns or not good[name].notna().any():
             continue
         rows: list[dict[str, Value]] = []
-        column = _metric(name)
+        column = metric_column(name)
         for label in contents.methods:
             own = good[good["label"] == label.short]
             values = own[name].dropna()
@@ -294,7 +205,7 @@ def comparison(contents: Contents, names: Sequence[str] = ()) -> Table:
             worst = values.max() if column.better != "higher" else values.min()
             rows.append(
                 {
-                    "metric": _metric_title(name),
+                    "metric": metric_title(name),
                     "method": label.short,
                     "label": label.short,
                     **_scaled(column, "mean", values.mean() if len(values) else None),
@@ -330,7 +241,7 @@ def comparison(contents: Contents, names: Sequence[str] = ()) -> Table:
         set_apart=contents.atlases,
         notes=(
             *method_notes(contents),
-            *_failure_notes(contents),
+            *failure_notes(contents),
             environment_note(contents),
         ),
     )
@@ -338,12 +249,6 @@ def comparison(contents: Contents, names: Sequence[str] = ()) -> Table:
 
 def _scaled(column: Column, key: str, value: float | None) -> dict[str, Value]:
     return {key: 100 * float(value) if column.percent and value is not None else value}
-
-
-def _metric_title(name: str) -> str:
-    column = _metric(name)
-    unit = "" if name == "seconds" or not METRICS[name].unit else f" [{METRICS[name].unit}]"
-    return f"{column.title}{' %' if column.percent else unit}"
 
 
 def against_published(contents: Contents) -> Table | None:
@@ -429,10 +334,7 @@ def everything(contents: Contents) -> Table:
             "method": contents.labels[row.id].text,
             "seed": float(row.seed),
             "status": row.status,
-            **{
-                name: _measured({str(k): v for k, v in by_id[row.id].items()}, name)
-                for name in names
-            },
+            **{name: number({str(k): v for k, v in by_id[row.id].items()}, name) for name in names},
         }
         for row in contents.rows
     )
@@ -445,7 +347,7 @@ def everything(contents: Contents) -> Table:
             Column("method", "Method", text=True),
             Column("seed", "seed", digits=0),
             Column("status", "status", text=True),
-            *(_metric(name) for name in names),
+            *(metric_column(name) for name in names),
         ),
         blocks=(rows,),
         notes=(environment_note(contents),),
@@ -455,10 +357,15 @@ def everything(contents: Contents) -> Table:
 def tables(contents: Contents) -> list[Table]:
     """The tables of a suite, the one to read first first."""
     made = [
+        ablation(contents),
         conformality(contents),
         against_published(contents),
         supplement(contents),
         comparison(contents),
+        success(contents),
+        cuts(contents),
+        paired_tests(contents),
+        seed_variance(contents),
         failures(contents),
     ]
     return [table for table in made if table is not None]

@@ -8,9 +8,10 @@ import subprocess
 import pytest
 
 from reports.contents import contents
-from reports.formats import comma_separated, latex, latex_text, markdown
+from reports.formats import comma_separated, html, latex, latex_text, markdown
 from reports.tables import everything, tables
 
+from .conftest import HOSTILE
 from .test_table import table
 
 
@@ -91,3 +92,16 @@ def test_csv_has_full_numbers_in_every_row():
     assert float(rows[0]["a"]) == 1 / 3
     assert rows[1]["a"] == "inf"
     assert rows[1]["b"] == ""
+
+
+def test_html_escapes_marks_and_blanks_what_stands_once():
+    made = table({"name": HOSTILE, "a": 0.1}, {"name": HOSTILE, "a": 0.2}, notes=("a < b",))
+    text = html("A & B", [made], lead="<i>")
+    assert "<script>" not in text
+    assert text.count("&lt;script&gt;") == 1
+    assert '<td class=" best">0.10' in text
+    assert '<td class=" second">0.20' in text
+    assert '<th colspan="2" scope="colgroup">G' in text
+    assert "<h1>A &amp; B</h1>" in text
+    assert "<h2>T</h2>" in text
+    assert "<li>a &lt; b" in text

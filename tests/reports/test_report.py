@@ -71,11 +71,13 @@ def test_the_page_is_whole_opens_from_disk_and_escapes(reported):
     assert source.index("<table") < source.index("<img")
 
 
-def test_every_table_is_there_in_three_formats(reported):
+def test_every_table_is_there_in_four_formats(reported):
     folder = reported / "report" / "tables" / "paper"
     names = {"conformality", "supplement", "comparison", "published", "failures", "cells"}
+    names |= {"success", "cuts"}
     assert {path.stem for path in folder.iterdir()} == names
-    assert all((folder / f"{n}{kind}").exists() for n in names for kind in (".tex", ".md", ".csv"))
+    kinds = (".tex", ".md", ".csv", ".html")
+    assert all((folder / f"{name}{kind}").exists() for name in names for kind in kinds)
 
 
 def test_failed_cells_only_give_a_report_that_says_so(tmp_path):
