@@ -48,6 +48,10 @@ TOLD = ("preset", "energy", "loss", "iterations", "points", "time_budget")
 """Parameters, or entries of a method's report, that are part of its name in a table."""
 
 
+BRANCHES = {"both": "both branches", "2d": "2D→3D→2D alone", "3d": "3D→2D→3D alone"}
+"""The ablations of ParaPoint's branches in words."""
+
+
 @dataclass(frozen=True)
 class Label:
     """A method with its parameters, as tables and figures name it.
@@ -94,7 +98,8 @@ def _words(name: str, value: object) -> str:
     if isinstance(value, int | float) and not isinstance(value, bool):
         unit = {"time_budget": "s budget"}.get(name, name.replace("_", " "))
         return f"{value:,} {unit.removesuffix('s') if value == 1 else unit}"
-    return str(value).replace("_", " ").replace("dirichlet", "Dirichlet")
+    told = BRANCHES.get(str(value)) if name == "branches" else None
+    return told or str(value).replace("_", " ").replace("dirichlet", "Dirichlet")
 
 
 def _told(rows: Sequence[ResultRow], name: str) -> str:
@@ -102,8 +107,8 @@ def _told(rows: Sequence[ResultRow], name: str) -> str:
     values: list[Any] = []
     for row in rows:
         value = row.report.get(name)
-        value = row.params.get(name) if value is None else value
-        if value is not None and not isinstance(value, list | dict) and value not in values:
+        value = row.params.get(name) if value is None or isinstance(value, list | dict) else value
+        if value is not None and value not in values:
             values.append(value)
     if len(values) > 1 and all(isinstance(value, int | float) for value in values):
         return f"{min(values):,} to {_words(name, max(values))}"
@@ -123,23 +128,18 @@ def labels(rows: Iterable[ResultRow]) -> dict[tuple[str, str], Label]:
     for key in keys:
         method = key[0]
         name, fixed = DISPLAY.get(method, (method, ""))
-        told = [_told(by_key[key], entry) for entry in TOLD]
         siblings = [params[other] for other in keys if other[0] == method and other != key]
         differing = [
             entry
             for entry, value in params[key].items()
             if any(other.get(entry) != value for other in siblings)
         ]
-        told += [
-            f"{entry.replace('_', ' ')} {params[key][entry]}"
-            for entry in differing
-            if entry not in TOLD
-        ]
+        told = [_told(by_key[key], entry) for entry in dict.fromkeys([*TOLD, *differing])]
         short, rivals = name, siblings
         for entry in differing:
             fewer = [other for other in rivals if other.get(entry) == params[key][entry]]
             if len(fewer) < len(rivals):
-                short += f" {_words(entry, params[key][entry]) or 'default'}"
+                short = f"{short} {_words(entry, params[key][entry])}".rstrip()
                 rivals = fewer
         detail = ", ".join(part for part in (fixed, *told) if part)
         found[key] = Label(method, key[1], name, detail, short)

@@ -11,6 +11,11 @@ from pathlib import Path
 
 from reports.table import Cell, Table, grouped
 
+PAGE = 45
+"""Rows of a LaTeX table on one page."""
+
+Rows = tuple[tuple[Cell, ...], ...]
+
 
 def write(made: Sequence[Table], folder: Path) -> None:
     """Write each table to `folder` as LaTeX, Markdown, CSV and HTML."""
@@ -45,6 +50,7 @@ _LATEX = {
     "·": r"$\cdot$",
     "×": r"$\times$",
     "≤": r"$\leq$",
+    "→": r"$\rightarrow$",
     "σ": r"$\sigma$",
     "“": "``",
     "”": "''",
@@ -64,14 +70,37 @@ def latex_text(text: str) -> str:
 
 
 def latex(table: Table) -> str:
-    """The table as a LaTeX float; needs the packages booktabs and graphicx."""
+    """The table as LaTeX floats of at most a page; needs the packages booktabs and graphicx."""
+    parts = _pages(table.cells)
+    floats = (
+        _latex_float(table, part, number, last=number == len(parts) - 1)
+        for number, part in enumerate(parts)
+    )
+    return "\n".join(["% needs \\usepackage{booktabs,graphicx}", *floats, ""])
+
+
+def _pages(blocks: Sequence[Rows]) -> list[list[Rows]]:
+    """Blocks by page: PAGE rows at most, a block parted only where it is longer than that."""
+    pieces = [block[at : at + PAGE] for block in blocks for at in range(0, len(block), PAGE)]
+    pages: list[list[Rows]] = [[]]
+    for piece in pieces:
+        if pages[-1] and sum(map(len, pages[-1])) + len(piece) > PAGE:
+            pages.append([])
+        pages[-1].append(piece)
+    return pages
+
+
+def _latex_float(table: Table, blocks: Sequence[Rows], number: int, *, last: bool) -> str:
+    """One float of the table; only the first has the caption and the label."""
     columns = table.columns
     lines = [
-        "% needs \\usepackage{booktabs,graphicx}",
-        r"\begin{table}[t]",
+        rf"\begin{{table}}[{'t' if last and not number else 'p'}]",
         r"\centering",
-        rf"\caption{{{latex_text(table.caption)}}}",
-        rf"\label{{tab:{table.name}}}",
+        *(
+            [r"\addtocounter{table}{-1}", r"\caption{(Continued.)}"]
+            if number
+            else [rf"\caption{{{latex_text(table.caption)}}}", rf"\label{{tab:{table.name}}}"]
+        ),
         r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%",
         r"\begin{tabular}{" + "".join("l" if column.text else "r" for column in columns) + "}",
         r"\toprule",
@@ -87,19 +116,19 @@ def latex(table: Table) -> str:
             at += width
         lines += [" & ".join(heads) + r" \\", " ".join(rules)]
     lines.append(" & ".join(latex_text(column.head) for column in columns) + r" \\")
-    for block in table.cells:
+    for block in blocks:
         lines.append(r"\midrule")
-        for number, row in enumerate(block):
+        for at, row in enumerate(block):
             cells = [
-                "" if number and column.once else _latex_cell(cell)
+                "" if at and column.once else _latex_cell(cell)
                 for column, cell in zip(columns, row, strict=True)
             ]
             lines.append(" & ".join(cells) + r" \\")
     lines += [r"\bottomrule", r"\end{tabular}}"]
-    if table.notes:
+    if table.notes and last:
         notes = r" \\ ".join(latex_text(note) for note in table.notes)
         lines.append(rf"\par\smallskip\parbox{{\linewidth}}{{\footnotesize {notes}}}")
-    return "\n".join([*lines, r"\end{table}", ""])
+    return "\n".join([*lines, r"\end{table}"])
 
 
 def _latex_cell(cell: Cell) -> str:

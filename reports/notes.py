@@ -57,3 +57,9 @@ def failure_notes(contents: Contents) -> list[str]:
         f"{method} {status} on {', '.join(dict.fromkeys(cases))}: {reason or 'no reason given'}."
         for (method, status, reason), cases in reasons.items()
     ]
+
+
+def legend(contents: Contents) -> str:
+    """What the short names of the methods stand for."""
+    told = [f"{label.short}: {label.detail}" for label in contents.methods if label.detail]
+    return f"Methods. {'; '.join(told)}."

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from scipy import stats
 
 from reports.contents import ANGLE, AREA, FLIPPED, SPANNING, Contents, Label, number
-from reports.notes import environment_note, failure_notes, method_notes
+from reports.notes import environment_note, failure_notes, legend, method_notes
 from reports.published import model
 from reports.table import Column, Table, Value, metric_column
 
@@ -46,7 +46,7 @@ def success(contents: Contents) -> Table:
         kinds.setdefault(kind(contents, case), []).append(case)
     records = contents.records
     rows: dict[str, dict[str, Value]] = {
-        label.short: {"method": label.text, "label": label.short} for label in contents.methods
+        label.short: {"method": label.short, "label": label.short} for label in contents.methods
     }
     columns = [Column("method", "Method", text=True)]
     for name, cases in kinds.items():
@@ -81,7 +81,12 @@ def success(contents: Contents) -> Table:
         columns=tuple(columns),
         blocks=(tuple(rows.values()),),
         set_apart=contents.atlases,
-        notes=(*method_notes(contents), *failure_notes(contents), environment_note(contents)),
+        notes=(
+            legend(contents),
+            *method_notes(contents),
+            *failure_notes(contents),
+            environment_note(contents),
+        ),
     )
 
 
@@ -115,7 +120,7 @@ def ablation(contents: Contents) -> Table | None:
             Column("done", "ok", text=True),
         ),
         blocks=tuple(_block(contents, case, names) for case in contents.cases),
-        notes=(_variants(contents), *failure_notes(contents), environment_note(contents)),
+        notes=(legend(contents), *failure_notes(contents), environment_note(contents)),
     )
 
 
@@ -128,19 +133,6 @@ _SHORT = {
     SPANNING: "spanning %",
     "seam_excess": "seam − artist's",
 }
-
-
-def _variants(contents: Contents) -> str:
-    """The parameters that all variants share, and what each has of its own."""
-    given = [label.parameters for label in contents.methods]
-    shared = {
-        name: value for name, value in given[0].items() if all(p.get(name) == value for p in given)
-    }
-    told = [
-        f"{name.replace('_', ' ')} {value}" for name, value in shared.items() if value is not None
-    ]
-    own = [f"{label.short}: {label.detail}" for label in contents.methods]
-    return f"All variants: {', '.join(told)}. {'; '.join(own)}."
 
 
 def _block(contents: Contents, case: str, names: Sequence[str]) -> tuple[Mapping[str, Value], ...]:

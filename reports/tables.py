@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from reports.contents import ANGLE, AREA, FLIPPED, SPANNING, Contents, number
-from reports.notes import environment_note, failure_notes, method_notes
+from reports.notes import environment_note, failure_notes, legend, method_notes
 from reports.published import AUTHORS, Verdict, claim_text, published_values, verdicts
 from reports.studies import ablation, cuts, paired_tests, seed_variance, success
 from reports.table import Column, Table, Value, metric_column, metric_title
@@ -70,18 +70,12 @@ def conformality(contents: Contents) -> Table:
         across=True,
         set_apart=contents.atlases,
         notes=(
-            _legend(contents),
+            legend(contents),
             *method_notes(contents),
             *_published_notes(authors),
             environment_note(contents),
         ),
     )
-
-
-def _legend(contents: Contents) -> str:
-    """What the short names of the methods stand for."""
-    told = [f"{label.short}: {label.detail}" for label in contents.methods if label.detail]
-    return f"Methods. {'; '.join(told)}."
 
 
 def _published_notes(authors: Sequence[str]) -> list[str]:

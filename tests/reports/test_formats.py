@@ -59,6 +59,16 @@ def test_every_latex_table_is_well_formed(results):
         assert "<script>" not in text
 
 
+def test_a_long_latex_table_goes_over_several_pages():
+    rows = [{"name": "x", "a": float(k)} for k in range(100)]
+    text = latex(table(*rows, notes=("end",)))
+    assert is_balanced(text)
+    assert text.count(r"\begin{table}") == text.count(r"\toprule") == 3
+    assert text.count(r"\label") == text.count("C\\_1") == text.count("footnotesize end") == 1
+    assert text.count("\nx & ") == 3  # what stands once stands once a page
+    assert "99.00" in text
+
+
 def test_latex_compiles(results, tmp_path):
     engine = next((e for e in ("pdflatex", "xelatex", "tectonic") if shutil.which(e)), None)
     if engine is None:

@@ -128,8 +128,7 @@ def test_an_ablation_has_variants_of_one_method(tmp_path):
     one, two = made.blocks[0]
     assert one["angle_difference_mean"] < two["angle_difference_mean"]
     assert [cell.mark for cell in made.cells[0][0]][2] == "best"
-    assert "points 64" in made.notes[0]
-    assert "distortion isometric" in made.notes[0]
+    assert "ParaPoint isometric: paper, 64 points, isometric" in made.notes[0]
 
 
 def test_an_automatic_cut_is_said_and_measured(tmp_path):
