@@ -23,7 +23,7 @@ from reports.contents import Contents
 from reports.galleries import cut_model, disks, heat_maps, is_cut, maps, models
 from reports.pictures import known_keys, slug, source_hash
 from reports.plots import area_convergence, convergence, cost, losses, pareto, singular_values
-from reports.style import STYLE
+from reports.style import STYLE, lighten
 
 
 @dataclass(frozen=True)
@@ -203,5 +203,6 @@ def write(folder: Path, drawing: Drawing) -> None:
             for file in files:
                 file.unlink(missing_ok=True)
             return
-        made.savefig(files[0], metadata={"CreationDate": None, "Title": drawing.title})
         made.savefig(files[1], metadata={"Title": drawing.title})
+        lighten(made)
+        made.savefig(files[0], metadata={"CreationDate": None, "Title": drawing.title})
