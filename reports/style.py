@@ -86,12 +86,20 @@ def put(place: Axes, path: Path) -> None:
 
 
 def lighten(made: Figure) -> None:
-    """Give the pictures of a figure 256 colours each: a PDF holds them in a fourth of the bytes."""
+    """Make the pictures of a figure light, for a PDF, which holds them without loss.
+
+    Those that 256 colours do not change to the eye (a checkerboard, clay) get these and a fourth of
+    the bytes; smooth colours stay, at three fifths of the resolution.
+    """
     for shown in made.findobj(AxesImage):
         whole = Images.fromarray(np.asarray(shown.get_array()))
-        few = whole.quantize(255, kmeans=4)
-        shown.set_data(np.asarray(few.convert("RGB")))
-        shown.set_interpolation("none")  # resampled, they would have all colours again
+        few = whole.quantize(255).convert("RGB")
+        if np.abs(np.asarray(few, dtype=np.int16) - np.asarray(whole)).mean() > 0.8:
+            few = whole.resize((round(0.6 * whole.width), round(0.6 * whole.height)))
+        extent = shown.get_extent()
+        shown.set_data(np.asarray(few))
+        shown.set_extent(extent)
+        shown.set_interpolation("none")  # resampled, it would have all colours again
 
 
 def note(place: Axes, text: str) -> None:
