@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -203,8 +203,14 @@ class Comparison:
 
     @cached_property
     def moves(self) -> list[Move]:
-        """The metrics that moved beyond noise."""
-        return [move for key in self.shared for name in WATCHED if (move := self._move(key, name))]
+        """The metrics that moved beyond noise; without spanning faces where that is another."""
+        found: dict[tuple[Key, float, float], Move] = {}
+        for key in self.shared:
+            for name in WATCHED:
+                move = self._move(key, name)
+                if move:
+                    found.setdefault((key, move.before, move.after), move)
+        return list(found.values())
 
     @cached_property
     def times(self) -> list[Move]:
@@ -376,11 +382,11 @@ _NAMES = (
 
 def moved(found: Comparison) -> Table | None:
     """Every metric and time that moved beyond noise, cell by cell; None where none did."""
-    rows = []
+    blocks: dict[Key, list[Mapping[str, Value]]] = {}
     for move in [*found.moves, *found.times]:
         old, new = found.group(move.key)
         sources = [{row.source_hash for row in group.rows.values()} for group in (old, new)]
-        rows.append(
+        blocks.setdefault(move.key, []).append(
             {
                 **_named(found, move.key),
                 "metric": metric_title(move.name).removesuffix(" %"),
@@ -393,7 +399,7 @@ def moved(found: Comparison) -> Table | None:
                 "verdict": move.verdict,
             }
         )
-    if not rows:
+    if not blocks:
         return None
     return Table(
         name="moved",
@@ -403,7 +409,7 @@ def moved(found: Comparison) -> Table | None:
             "Source: whether the method's own source is the same in both."
         ),
         columns=(
-            *_NAMES,
+            *(replace(column, once=True) for column in _NAMES),
             Column("metric", "Metric", text=True),
             Column("before", "before", digits=4),
             Column("after", "after", digits=4),
@@ -413,7 +419,7 @@ def moved(found: Comparison) -> Table | None:
             Column("source", "Source", text=True),
             Column("verdict", "Verdict", text=True),
         ),
-        blocks=(tuple(rows),),
+        blocks=tuple(tuple(rows) for rows in blocks.values()),
     )
 
 

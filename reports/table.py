@@ -58,7 +58,7 @@ class Column:
             return f"<{10**-self.digits:.{self.digits}f}"
         if abs(number) >= 1e5:
             mantissa, exponent = f"{number:.1e}".split("e")
-            return f"{mantissa}·10^{int(exponent)}"
+            return f"{mantissa}·10^{int(exponent)}".replace("-", "−")
         return f"{number:,.{self.digits}f}".replace("-", "−")
 
 
