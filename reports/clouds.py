@@ -19,7 +19,9 @@ from reports.render import Floats, Image, View
 SPARSE, DENSE = 10_000, 250_000
 """Points of the paper's input, and of its texture mapping."""
 
-DOT, SEAM_DOT = 0.34, 0.5
+GREY = render.linear([0.62, 0.62, 0.62])
+
+DOT, SEAM_DOT = 0.38, 0.5
 """Radius of a dot in the cloud, and of one on a seam, in mean distances of the sparse points."""
 
 
@@ -106,7 +108,7 @@ def _seams(view: View, seam: FloatArray, dots: BoolArray, seen: Floats, spacing:
         distance, _ = cKDTree(seam).query(seen, workers=-1)
         green = distance < SEAM_DOT * spacing
     kept = dots | green
-    colours = np.where(green[kept, None], render.SEAM_GREEN, render.CLAY)
+    colours = np.where(green[kept, None], render.SEAM_GREEN, GREY)
     return _part(view, kept).image(colours.astype(np.float32))
 
 

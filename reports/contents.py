@@ -211,6 +211,11 @@ class Contents:
                 return surface if isinstance(surface, Mesh) else None
         return None
 
+    def has_artist(self, case: str) -> bool:
+        """Whether the model came with a map of its own."""
+        hashes = {row.surface_hash for row in self.rows if row.case == case and row.surface_hash}
+        return any(self.store.reference_path(name).exists() for name in hashes)
+
     @cached_property
     def atlases(self) -> frozenset[str]:
         """Short names of the methods that cut into many charts: no rivals of one-chart maps."""

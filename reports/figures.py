@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -19,8 +19,19 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from benchmarks.results import ResultRow
+from reports.clouds import DENSE, SPARSE
 from reports.contents import Contents
-from reports.galleries import cut_model, disks, heat_maps, is_cut, maps, models
+from reports.galleries import (
+    ablation,
+    ablation_of_the_paper,
+    clouds,
+    cut_model,
+    disks,
+    heat_maps,
+    is_cut,
+    maps,
+    models,
+)
 from reports.pictures import known_keys, slug, source_hash
 from reports.plots import area_convergence, convergence, cost, losses, pareto, singular_values
 from reports.style import STYLE, lighten
@@ -45,6 +56,34 @@ class Drawing:
     figure: Callable[[], Figure | None]
 
 
+MODELS, ROWS, PANELS = 12, 7, 9
+"""Models on a page of models, of rows of pictures, of plots."""
+
+
+def paged(
+    contents: Contents,
+    name: str,
+    title: str,
+    caption: str,
+    *,
+    make: Callable[[Sequence[str]], Figure | None],
+    cases: Sequence[str],
+    size: int,
+) -> list[Drawing]:
+    """A figure of `cases`, or several of `size` of them each: none is longer than a page."""
+    parts = [cases[at : at + size] for at in range(0, len(cases), size)]
+    return [
+        Drawing(
+            f"{name}-{number}" if number > 1 else name,
+            f"{title}, {number} of {len(parts)}" if len(parts) > 1 else title,
+            caption,
+            tuple(row for row in contents.rows if row.case in part),
+            partial(make, part),
+        )
+        for number, part in enumerate(parts, start=1)
+    ]
+
+
 def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
     """All figures of a suite, the ones to look at first first."""
     checker = (
@@ -53,80 +92,129 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
         "flipped faces. UV layouts are coloured by the surface's normals, so that its parts can "
         "be told; faces that span a learned seam are left pale there and lie below the others."
     )
-    whole = contents.rows
-
-    def of_suite(name: str, title: str, caption: str, make: Callable[[], Figure | None]) -> Drawing:
-        return Drawing(name, title, caption, whole, make)
+    cases = contents.cases
+    whole = [case for case in cases if not is_cut(contents, case)]
+    several = partial(paged, contents)
 
     found = [
-        of_suite(
+        *several(
             "models",
             "Test models",
             "The models from two sides, with their mesh edges.",
-            partial(models, contents, pictures),
+            make=partial(models, contents, pictures),
+            cases=cases,
+            size=MODELS,
         ),
-        of_suite(
+        *several(
             "disks",
             "SLIM and ParaPoint on the disks",
             f"The supplement's figure: the models that need no cut. {checker}",
-            partial(disks, contents, pictures),
+            make=partial(disks, contents, pictures),
+            cases=whole,
+            size=ROWS,
+        ),
+        *several(
+            "clouds",
+            "ParaPoint from points",
+            f"The paper's figure. (a) {SPARSE:,} points, as ParaPoint gets them, coloured by the "
+            "true normals, which it does not get. (b) Their uv, in the same colours. (c) The "
+            f"checkerboard on {DENSE:,} points. (d) Green: points of the faces that span a learned "
+            "seam. The uv of a point is interpolated in its face, or is that of the nearest corner "
+            "where the face spans a seam: the results hold no network that could be asked.",
+            make=partial(clouds, contents, pictures),
+            cases=cases,
+            size=ROWS,
         ),
     ]
-    for case in contents.cases:
-        if is_cut(contents, case):
-            rows = tuple(row for row in contents.rows if row.case == case)
+    if len(contents.methods) > 1 and len({label.method for label in contents.methods}) == 1:
+        found += [
+            *several(
+                "ablation",
+                f"Ablation of {contents.methods[0].name}",
+                f"One change at a time: UV layout above, texture below. {checker}",
+                make=partial(ablation, contents, pictures),
+                cases=cases,
+                size=3,
+            ),
+            Drawing(
+                "ablation-paper",
+                "The paper's ablation",
+                "(a) The cube under the conformal and (b) under the isometric term; (c) the eight "
+                "with the 2D→3D→2D branch alone and (d) with the 3D→2D→3D branch alone. UV layout "
+                f"above, texture below. {checker}",
+                contents.rows,
+                partial(ablation_of_the_paper, contents, pictures),
+            ),
+        ]
+    for case in cases:
+        rows = tuple(row for row in contents.rows if row.case == case)
+        if is_cut(contents, case) or contents.has_artist(case):
             found.append(
                 Drawing(
                     f"cut-{slug(case)}",
-                    f"{case}: automatic cut and learned seam",
-                    f"(a) The model, which is no disk. (b) SLIM on the automatic cut, which is "
-                    f"the same for every method that needs one (the paper's was made by hand). "
-                    f"(c) ParaPoint with the seam it learned. {checker}",
+                    f"{case}: hand-made, automatic and learned cut",
+                    "The model; the artist's own map, where the file has one (the hand-made cut of "
+                    "the paper's nefertiti is not public); SLIM on the automatic cut, the same for "
+                    f"every method that needs one; ParaPoint with the seam it learned. {checker}",
                     rows,
                     partial(cut_model, contents, case, pictures),
                 )
             )
     found += [
-        of_suite(
+        *several(
             "pareto",
             "Angles against areas",
             "Angle difference (over all faces) against area discrepancy; the grey steps join what "
             "no other method with one chart beats in both (hollow: many charts). A map may buy the "
             "one with the other.",
-            partial(pareto, contents),
+            make=partial(pareto, contents),
+            cases=cases,
+            size=PANELS,
         ),
-        of_suite(
+        *several(
             "convergence",
             "Angle distortion against time",
             "Angle difference over all faces along the way of every method that keeps a trace; a "
             "single marker is a method without one, at its end.",
-            partial(convergence, contents),
+            make=partial(convergence, contents),
+            cases=cases,
+            size=PANELS,
         ),
-        of_suite(
+        *several(
             "convergence-area",
             "Area distortion against time",
             "Area discrepancy over all faces along the way, as in the figure of the angles.",
-            partial(area_convergence, contents),
+            make=partial(area_convergence, contents),
+            cases=cases,
+            size=PANELS,
         ),
-        of_suite(
+        *several(
             "losses",
             "Losses of ParaPoint",
             "Loss terms of ParaPoint, as they enter the total, against iterations.",
-            partial(losses, contents),
+            make=partial(losses, contents),
+            cases=cases,
+            size=PANELS,
         ),
-        of_suite(
+        *several(
             "singular-values",
             "Singular values",
-            "Share of the surface's area by singular value of the map, both of them, UV area "
-            "scaled to the surface's, faces that span a learned seam left out: an isometry is one "
-            "peak at 1, a conformal map moves both values together.",
-            partial(singular_values, contents),
+            "How the surface's area is distributed over the singular values of the map, UV area "
+            "scaled to the surface's, faces that span a learned seam left out: the larger filled, "
+            "the smaller as a line, heights relative to the higher peak of each row. An isometry "
+            "is one peak at 1; a conformal map moves both together.",
+            make=partial(singular_values, contents),
+            cases=cases,
+            size=PANELS,
         ),
-        of_suite(
-            "cost", "Time against size", "Wall time of each method against the number of faces.",
+        Drawing(
+            "cost",
+            "Time against size",
+            "Wall time of each method against the number of faces.",
+            contents.rows,
             partial(cost, contents),
         ),
-    ]  # fmt: skip
+    ]
     for case in contents.cases:
         rows = tuple(row for row in contents.rows if row.case == case)
         if any(row.status == "ok" for row in rows):

@@ -12,7 +12,14 @@ from matplotlib.figure import Figure
 
 from benchmarks.results import ResultRow
 from reports.contents import ANGLE, AREA, FLIPPED, Contents, Label
-from reports.pictures import ANGLE_SCALE, AREA_SCALE, map_file, model_file
+from reports.pictures import (
+    ANGLE_SCALE,
+    AREA_SCALE,
+    ARTIST_PICTURES,
+    CLOUD_PICTURES,
+    map_file,
+    model_file,
+)
 from reports.style import WIDTH, figure, note, picture_grid, put, wrapped
 
 
@@ -62,15 +69,15 @@ def pictures_of(
     return [said, *[""] * (len(kinds) - 1)]
 
 
-def models(contents: Contents, pictures: Path) -> Figure:
+def models(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure:
     """The test models from two sides with their mesh edges."""
-    across = 3 if len(contents.cases) > 2 else len(contents.cases)
-    down = -(-len(contents.cases) // across)
+    across = min(3, len(cases))
+    down = -(-len(cases) // across)
     side, gap, foot = (WIDTH - 0.2) / 6, 0.02, 0.34
     height = down * (side + foot)
     width = across * (2 * (side + gap) + 0.06)
     made = figure(width, height)
-    for number, case in enumerate(contents.cases):
+    for number, case in enumerate(cases):
         x0 = (number % across) * (2 * (side + gap) + 0.06)
         y0 = height - (number // across + 1) * (side + foot) + foot
         for at, kind in enumerate(("mesh-1", "mesh-2")):
@@ -94,12 +101,11 @@ def is_cut(contents: Contents, case: str) -> bool:
     return any(row.preprocessing for row in contents.rows if row.case == case)
 
 
-def disks(contents: Contents, pictures: Path) -> Figure | None:
-    """The supplement's figure: SLIM and ParaPoint on every model that needs no cut."""
+def disks(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure | None:
+    """The supplement's figure: SLIM and ParaPoint on models that need no cut."""
     pair = [leading(contents, "slim"), leading(contents, "parapoint")]
     chosen = [label for label in pair if label is not None]
-    cases = [case for case in contents.cases if not is_cut(contents, case)]
-    if not chosen or not cases:
+    if not chosen:
         return None
     kinds = ("layout", "checker-1", "checker-2")
     heads = [f"{label.name}: {kind}" for label in chosen for kind in ("UV", "view 1", "view 2")]
@@ -116,40 +122,133 @@ def disks(contents: Contents, pictures: Path) -> Figure | None:
     return picture_grid(heads, rows, side=(WIDTH - 1.3) / 3 if len(chosen) == 1 else 1.05)
 
 
+def clouds(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure | None:
+    """The paper's figure: cloud, uv, texture on dense points and learned seams of ParaPoint."""
+    label = leading(contents, "parapoint")
+    if label is None or not any(contents.shown(case, label) for case in cases):
+        return None
+    heads = ["(a) cloud", "(b) UV", "(c) texture", "(d) learned seams"]
+    rows = []
+    for case in cases:
+        row = contents.shown(case, label)
+        values = values_text(contents, row) if row else ""
+        shown = pictures_of(contents, case, label, CLOUD_PICTURES, pictures)
+        rows.append((wrapped(case, 18), values, shown))
+    return picture_grid(heads, rows, side=1.4, left=1.3)
+
+
 def cut_model(contents: Contents, case: str, pictures: Path) -> Figure | None:
-    """Nefertiti's figure: the model, SLIM with the automatic cut, ParaPoint with its own seam."""
+    """Nefertiti's figure: the model, the artist's cut if known, SLIM's automatic, the learned."""
     pair = [leading(contents, "slim"), leading(contents, "parapoint")]
     chosen = [label for label in pair if label is not None]
-    if not chosen:
-        return None
-    side, foot = WIDTH / (1 + 2 * len(chosen)) - 0.04, 0.62
-    made = figure(WIDTH, side + foot)
-    shown: list[tuple[Path | str, str]] = [(pictures / model_file(case, "mesh-1"), "")]
+    artist = [pictures / model_file(case, kind) for kind in ARTIST_PICTURES]
+    panels: list[tuple[str, str, Sequence[Path | str]]] = []
+    if all(path.exists() for path in artist):
+        panels.append(("hand-made: the artist's map", "", artist))
     for label in chosen:
-        shown += [
-            (picture, "")
-            for picture in pictures_of(contents, case, label, ("checker-1", "layout"), pictures)
-        ]
-    for number, (picture, _) in enumerate(shown):
+        row = contents.shown(case, label)
+        cut = "automatic cut" if row is not None and row.preprocessing else "learned seam"
+        shown = pictures_of(contents, case, label, ("checker-1", "layout"), pictures)
+        text = values_text(contents, row) if row else ""
+        panels.append((f"{label.name}, {cut}", text, shown))
+    if not panels:
+        return None
+    side, foot = WIDTH / (1 + 2 * len(panels)) - 0.04, 0.62
+    made = figure(WIDTH, side + foot)
+    shown_all = [pictures / model_file(case, "mesh-1"), *(p for panel in panels for p in panel[2])]
+    for number, picture in enumerate(shown_all):
         x = number * (side + 0.04) / WIDTH
         place = made.add_axes((x, foot / (side + foot), side / WIDTH, side / (side + foot)))
         if isinstance(picture, Path):
             put(place, picture)
         else:
             note(place, picture)
-    name = wrapped(f"(a) {case.replace('_', ' ').replace('-', ' ')}", 22)
-    made.text(side / 2 / WIDTH, 0.5 / (side + foot), name, ha="center", va="top")
-    for number, label in enumerate(chosen):
-        row = contents.shown(case, label)
+    name = wrapped(f"(a) {case.replace('_', ' ').replace('-', ' ')}", 20)
+    top, below = 0.5 / (side + foot), 0.32 / (side + foot)
+    made.text(side / 2 / WIDTH, top, name, ha="center", va="top", fontsize=8)
+    for number, (head, text, _) in enumerate(panels):
         x = ((1 + 2 * number) * (side + 0.04) + side + 0.02) / WIDTH
-        cut = "automatic cut" if row is not None and row.preprocessing else "learned seam"
-        head = f"({'bc'[number]}) {label.name}, {cut}"
-        made.text(x, 0.5 / (side + foot), head, ha="center", va="top")
-        if row is not None:
-            text = values_text(contents, row)
+        made.text(x, top, f"({'bcd'[number]}) {head}", ha="center", va="top", fontsize=8)
+        made.text(x, below, text, ha="center", va="top", fontsize=7, color="0.3")
+    return made
+
+
+def ablation(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure:
+    """Variants of one method side by side: the UV layout above the texture, model by model."""
+    labels = contents.methods
+    gap, left, top, foot = 0.06, 0.75, 0.42, 0.34
+    side = (WIDTH - left) / len(labels) - gap
+    height = top + len(cases) * (2 * side + foot)
+    made = figure(WIDTH, height)
+    for column, label in enumerate(labels):
+        x = left + column * (side + gap)
+        words = wrapped(label.short.removeprefix(f"{label.name} "), 17)
+        words = "as in the paper" if label.short == label.name else words
+        made.text((x + side / 2) / WIDTH, 1 - 0.05 / height, words, ha="center", va="top")
+        for number, case in enumerate(cases):
+            y = height - top - number * (2 * side + foot)
+            shown = pictures_of(contents, case, label, ("layout", "checker-1"), pictures)
+            for down, picture in enumerate(shown, start=1):
+                box = (x / WIDTH, (y - down * side) / height, side / WIDTH, side / height)
+                place = made.add_axes(box)
+                if isinstance(picture, Path):
+                    put(place, picture)
+                else:
+                    note(place, picture)
+            row = contents.shown(case, label)
             made.text(
-                x, 0.32 / (side + foot), text, ha="center", va="top", fontsize=7.5, color="0.3"
+                (x + side / 2) / WIDTH,
+                (y - 2 * side - 0.02) / height,
+                values_text(contents, row).replace("   ", " ") if row else "",
+                ha="center",
+                va="top",
+                fontsize=6.5,
+                color="0.3",
             )
+    for number, case in enumerate(cases):
+        y = height - top - number * (2 * side + foot) - side
+        made.text(
+            0.04 / WIDTH, y / height, wrapped(case.replace("_", " "), 10), va="center", fontsize=8.5
+        )
+    return made
+
+
+def ablation_of_the_paper(contents: Contents, pictures: Path) -> Figure | None:
+    """The paper's four: the cube under both distortion terms, the eight under either branch."""
+    wanted = (
+        ("cube", "conformal", {"distortion": None, "branches": None, "distortion_weight": None}),
+        ("cube", "isometric", {"distortion": "isometric"}),
+        ("eight", "2D→3D→2D alone", {"branches": "2d"}),
+        ("eight", "3D→2D→3D alone", {"branches": "3d"}),
+    )
+    panels: list[tuple[str, list[Path | str]]] = []
+    for model, words, changes in wanted:
+        case = next((case for case in contents.cases if case.startswith(model)), None)
+        label = next(
+            (
+                label
+                for label in contents.methods
+                if all(label.parameters.get(name) == value for name, value in changes.items())
+            ),
+            None,
+        )
+        if case is None or label is None:
+            return None
+        shown = pictures_of(contents, case, label, ("layout", "checker-1"), pictures)
+        panels.append((f"({'abcd'[len(panels)]}) {model}, {words}", shown))
+    side, gap, foot = (WIDTH - 0.3) / 4, 0.1, 0.3
+    height = 2 * side + foot
+    made = figure(WIDTH, height)
+    for column, (words, shown) in enumerate(panels):
+        x = column * (side + gap)
+        for down, picture in enumerate(shown, start=1):
+            box = (x / WIDTH, (height - down * side) / height, side / WIDTH, side / height)
+            place = made.add_axes(box)
+            if isinstance(picture, Path):
+                put(place, picture)
+            else:
+                note(place, picture)
+        made.text((x + side / 2) / WIDTH, 0.2 / height, words, ha="center", va="top", fontsize=8)
     return made
 
 

@@ -209,6 +209,7 @@ def normal_colours(scene: Scene, camera: Camera) -> Floats:
 
 MODEL_PICTURES = ("mesh-1", "mesh-2")
 MAP_PICTURES = ("checker-1", "checker-2", "layout", "angle", "angle-uv", "area", "area-uv")
+ARTIST_PICTURES = ("artist-checker-1", "artist-layout")
 CLOUD_PICTURES = ("cloud", "cloud-uv", "dense", "seams")
 
 
@@ -254,6 +255,8 @@ def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
         todo = []
         latest = rows[-1]
         wanted = {model_file(case, kind): (latest, "") for kind in MODEL_PICTURES}
+        if contents.store.reference_path(latest.surface_hash).exists():
+            wanted |= {model_file(case, kind): (latest, "artist") for kind in ARTIST_PICTURES}
         for row in rows:
             if row.status == "ok":
                 wanted |= {map_file(row, kind): (row, row.uv_sha256) for kind in kinds(row)}
@@ -313,7 +316,19 @@ def draw_model(results: Path, rows: list[ResultRow], folder: Path) -> tuple[list
     views = [scene.view(camera, SIZE, SAMPLES) for camera in cameras]
     for name, view in zip(files, views, strict=True):
         save(meshed(view), folder / name)
-    failed, faults = [], []
+    failed: list[str] = []
+    faults: list[str] = []
+    try:
+        artist = store.reference(rows[-1])
+    except InputError as error:
+        artist = None
+        failed += [model_file(case, kind) for kind in ARTIST_PICTURES]
+        faults.append(f"{case}: no picture of the artist's map: {error}")
+    if artist is not None:
+        found = Map(surface, artist)
+        layout = Layout(found).image(normal_colours(scene, views[0].camera))
+        for kind, image in zip(ARTIST_PICTURES, (textured(views[0], found), layout), strict=True):
+            save(image, folder / model_file(case, kind))
     for row in rows:
         if row.status != "ok":
             continue

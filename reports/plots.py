@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
@@ -16,17 +18,17 @@ from benchmarks.metrics import MapState
 from benchmarks.results import ResultRow
 from parapoint.errors import InputError
 from parapoint.parameterization import Parameterization
-from parapoint.surface import Mesh
+from parapoint.surface import FloatArray, Mesh
 from reports.contents import ANGLE, AREA, Contents, Label
 from reports.galleries import leading
-from reports.style import COLOURS, DASHES, legend_below, look, plain_log, small_multiples
+from reports.style import COLOURS, DASHES, legend_below, look, plain_log, small_multiples, wrapped
 
 
-def losses(contents: Contents) -> Figure | None:
+def losses(contents: Contents, cases: Sequence[str]) -> Figure | None:
     """Loss terms of ParaPoint against iterations, model by model."""
     label = leading(contents, "parapoint")
     traces = {}
-    for case in contents.cases:
+    for case in cases:
         row = contents.shown(case, label) if label else None
         found = trace_of(contents, row) if row else pd.DataFrame()
         if len(found) > 1:
@@ -94,20 +96,22 @@ def quality_trace(contents: Contents, row: ResultRow) -> pd.DataFrame:
     return pd.DataFrame(records)
 
 
-def convergence(contents: Contents) -> Figure | None:
+def convergence(contents: Contents, cases: Sequence[str]) -> Figure | None:
     """Angle distortion against time for every method with a trace; others as a single point."""
-    return _convergence(contents, "angle", ANGLE, "angle difference [rad]")
+    return _convergence(contents, cases, "angle", ANGLE, "angle difference [rad]")
 
 
-def area_convergence(contents: Contents) -> Figure | None:
+def area_convergence(contents: Contents, cases: Sequence[str]) -> Figure | None:
     """Area distortion against time, likewise."""
-    return _convergence(contents, "area", AREA, "area discrepancy")
+    return _convergence(contents, cases, "area", AREA, "area discrepancy")
 
 
-def _convergence(contents: Contents, name: str, metric: str, title: str) -> Figure | None:
+def _convergence(
+    contents: Contents, cases: Sequence[str], name: str, metric: str, title: str
+) -> Figure | None:
     curves: dict[str, list[tuple[Label, pd.DataFrame]]] = {}
     traced = False
-    for case in contents.cases:
+    for case in cases:
         for label in contents.methods:
             row = contents.shown(case, label)
             if row is None or row.seconds is None:
@@ -140,11 +144,11 @@ def _convergence(contents: Contents, name: str, metric: str, title: str) -> Figu
     return made
 
 
-def pareto(contents: Contents) -> Figure | None:
+def pareto(contents: Contents, cases: Sequence[str]) -> Figure | None:
     """Angle against area distortion, model by model: nearer to the lower left is better."""
     good = contents.means[contents.means["ok"] > 0]
     good = good[np.isfinite(good[ANGLE]) & np.isfinite(good[AREA])]
-    cases = [case for case in contents.cases if (good["case"] == case).any()]
+    cases = [case for case in cases if (good["case"] == case).any()]
     if not cases:
         return None
     made, places = small_multiples(len(cases))
@@ -174,45 +178,58 @@ def pareto(contents: Contents) -> Figure | None:
     return made
 
 
-def singular_values(contents: Contents) -> Figure | None:
-    """How much of the surface is stretched by how much: both singular values, all methods."""
-    cases = [case for case in contents.cases if contents.mesh(case) is not None]
+def singular_values(contents: Contents, cases: Sequence[str]) -> Figure | None:
+    """How much of the surface is stretched by how much: both singular values, method by method."""
     cases = [case for case in cases if any(contents.shown(case, m) for m in contents.methods)]
-    if not cases:
+    surfaces = {case: mesh for case in cases if (mesh := contents.mesh(case)) is not None}
+    if not surfaces:
         return None
-    made, places = small_multiples(len(cases))
-    bins = np.linspace(-5, 5, 61)
+    labels = contents.methods
+    made, places = small_multiples(len(surfaces), height=0.3 * len(labels) + 0.75, left=0.19)
+    bins = np.linspace(-5, 5, 81)
     middle = (bins[1:] + bins[:-1]) / 2
-    for place, case in zip(places, cases, strict=True):
-        surface = contents.mesh(case)
-        assert surface is not None
-        for label in contents.methods:
+    for number, (place, (case, surface)) in enumerate(zip(places, surfaces.items(), strict=True)):
+        for line, label in enumerate(labels):
             row = contents.shown(case, label)
-            if row is None:
+            sigmas = singular_value_shares(contents, surface, row, bins) if row else None
+            y = len(labels) - 1 - line
+            if sigmas is None:
+                place.text(0, y + 0.1, "no map", ha="center", fontsize=6.5, color="0.5")
                 continue
-            try:
-                result = contents.store.result(row)
-            except InputError:
-                continue
-            if not isinstance(result, Parameterization):
-                continue
-            found = MapState(surface, result).distortion_without_spanning
-            style = look(contents, label) | {"marker": "", "linewidth": 1.0}
-            for sigma in (found.sigma1, found.sigma2):
-                known = found.finite & (sigma > 0)
-                at = np.clip(np.log2(sigma[known]), -5, 5)
-                share, _ = np.histogram(at, bins, weights=found.area[known])
-                shown = label.short if sigma is found.sigma1 else None
-                place.plot(middle, share, label=shown, **style)
+            larger, smaller = 0.85 * sigmas / sigmas.max()
+            colour = look(contents, label)["color"]
+            place.fill_between(middle, y, y + larger, step="mid", color=colour, alpha=0.4, lw=0)
+            place.step(middle, y + smaller, where="mid", color=colour, linewidth=0.9)
         place.axvline(0, color="0.5", linewidth=0.6)
-        place.set_yscale("log")
-        place.set_ylim(1e-3, 1.3)
+        place.set_xlim(-5, 5)
+        place.set_ylim(-0.1, len(labels))
         place.set_xticks([-4, -2, 0, 2, 4], ["1/16", "1/4", "1", "4", "16"])
+        names = [wrapped(label.short, 19) for label in labels][::-1]
+        place.set_yticks(range(len(labels)), names if number % 3 == 0 else [], fontsize=6.5)
+        place.tick_params(axis="y", length=0)
         place.set_title(case)
-        place.set_xlabel(r"$\sigma_1$, $\sigma_2$")
-    places[0].set_ylabel("share of the area")
-    legend_below(made, places)
+        place.set_xlabel(r"$\sigma_1$ (filled), $\sigma_2$ (line)")
     return made
+
+
+def singular_value_shares(
+    contents: Contents, surface: Mesh, row: ResultRow, bins: FloatArray
+) -> FloatArray | None:
+    """(2, n) shares of the area by log2 of each singular value; None without a map of the mesh."""
+    try:
+        result = contents.store.result(row)
+    except InputError:
+        return None
+    if not isinstance(result, Parameterization):
+        return None
+    found = MapState(surface, result).distortion_without_spanning
+    shares = []
+    for sigma in (found.sigma1, found.sigma2):
+        known = found.finite & (sigma > 0)
+        at = np.clip(np.log2(sigma[known]), bins[0], bins[-1])
+        shares.append(np.histogram(at, bins, weights=found.area[known])[0])
+    made = np.array(shares)
+    return made if made.max() > 0 else None
 
 
 def cost(contents: Contents) -> Figure | None:

@@ -162,7 +162,9 @@ def wrapped(name: str, width: int = 20) -> str:
     return "\n".join(lines)
 
 
-def small_multiples(count: int, height: float = 2.1) -> tuple[Figure, list[Axes]]:
+def small_multiples(
+    count: int, height: float = 2.1, left: float = 0.08
+) -> tuple[Figure, list[Axes]]:
     """A figure of `count` like panels, three in a row, with room for a legend below."""
     across = min(3, count)
     down = -(-count // across)
@@ -170,7 +172,7 @@ def small_multiples(count: int, height: float = 2.1) -> tuple[Figure, list[Axes]
     grid = made.add_gridspec(
         down,
         across,
-        left=0.08,
+        left=left,
         right=0.985,
         top=1 - 0.25 / (down * height + 0.55),
         bottom=0.82 / (down * height + 0.55),
