@@ -118,8 +118,9 @@ def disks(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure | 
             row = contents.shown(case, label)
             if row is not None:
                 lines.append(f"{label.name}\n{values_text(contents, row)}")
-        rows.append((wrapped(case, 18), "\n".join(lines), found))
-    return picture_grid(heads, rows, side=(WIDTH - 1.3) / 3 if len(chosen) == 1 else 1.05)
+        rows.append((wrapped(case), "\n".join(lines), found))
+    side = (WIDTH - 1.5) / 3 if len(chosen) == 1 else 1.05
+    return picture_grid(heads, rows, side=side, left=1.5)
 
 
 def clouds(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure | None:
@@ -133,8 +134,8 @@ def clouds(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure |
         row = contents.shown(case, label)
         values = values_text(contents, row) if row else ""
         shown = pictures_of(contents, case, label, CLOUD_PICTURES, pictures)
-        rows.append((wrapped(case, 18), values, shown))
-    return picture_grid(heads, rows, side=1.4, left=1.3)
+        rows.append((wrapped(case), values, shown))
+    return picture_grid(heads, rows, side=1.33, left=1.5)
 
 
 def cut_model(contents: Contents, case: str, pictures: Path) -> Figure | None:
@@ -207,9 +208,7 @@ def ablation(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure
             )
     for number, case in enumerate(cases):
         y = height - top - number * (2 * side + foot) - side
-        made.text(
-            0.04 / WIDTH, y / height, wrapped(case.replace("_", " "), 10), va="center", fontsize=8.5
-        )
+        made.text(0.04 / WIDTH, y / height, wrapped(case, 10), va="center", fontsize=8.5)
     return made
 
 

@@ -157,7 +157,8 @@ def pareto(contents: Contents, cases: Sequence[str]) -> Figure | None:
         for label in contents.methods:
             if label.short in own.index:
                 record = own.loc[label.short]
-                style = look(contents, label) | {"linestyle": "none", "markersize": 6.5}
+                style = look(contents, label) | {"linestyle": "none"}
+                style["markersize"] = 10 if style["marker"] == "*" else 6.5
                 if label.short in contents.atlases:
                     style |= {"markerfacecolor": "none", "markeredgecolor": style["color"]}
                 else:
@@ -185,7 +186,8 @@ def singular_values(contents: Contents, cases: Sequence[str]) -> Figure | None:
     if not surfaces:
         return None
     labels = contents.methods
-    made, places = small_multiples(len(surfaces), height=0.3 * len(labels) + 0.75, left=0.19)
+    tall = 0.33 * len(labels) + 0.8
+    made, places = small_multiples(len(surfaces), tall, left=0.21, bottom=0.5)
     bins = np.linspace(-5, 5, 81)
     middle = (bins[1:] + bins[:-1]) / 2
     for number, (place, (case, surface)) in enumerate(zip(places, surfaces.items(), strict=True)):
@@ -203,9 +205,12 @@ def singular_values(contents: Contents, cases: Sequence[str]) -> Figure | None:
         place.axvline(0, color="0.5", linewidth=0.6)
         place.set_xlim(-5, 5)
         place.set_ylim(-0.1, len(labels))
-        place.set_xticks([-4, -2, 0, 2, 4], ["1/16", "1/4", "1", "4", "16"])
-        names = [wrapped(label.short, 19) for label in labels][::-1]
-        place.set_yticks(range(len(labels)), names if number % 3 == 0 else [], fontsize=6.5)
+        place.set_xticks([-5, -2, 0, 2, 5], ["≤1/32", "1/4", "1", "4", "≥32"])
+        names = [wrapped(label.short, 25) for label in labels][::-1]
+        shown = names if number % 3 == 0 else [""] * len(names)
+        middles = np.arange(len(labels)) + 0.3
+        place.set_yticks(middles, shown, fontsize=6.5, linespacing=0.85)
+        place.grid(visible=False, axis="y")
         place.tick_params(axis="y", length=0)
         place.set_title(case)
         place.set_xlabel(r"$\sigma_1$ (filled), $\sigma_2$ (line)")

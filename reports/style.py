@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -152,30 +153,29 @@ def picture_grid(
 
 
 def wrapped(name: str, width: int = 20) -> str:
-    """`name` over several lines."""
-    lines: list[str] = []
-    for word in name.split():
-        if lines and len(lines[-1]) + 1 + len(word) <= width:
-            lines[-1] += f" {word}"
-        else:
-            lines.append(word)
-    return "\n".join(lines)
+    """`name` over several lines, parted at spaces, hyphens and underscores."""
+    lines = [""]
+    for piece in re.split(r"(?<=[-_ ])", name):
+        if lines[-1] and len((lines[-1] + piece).rstrip()) > width:
+            lines.append("")
+        lines[-1] += piece
+    return "\n".join(line.rstrip() for line in lines)
 
 
 def small_multiples(
-    count: int, height: float = 2.1, left: float = 0.08
+    count: int, height: float = 2.1, *, left: float = 0.08, bottom: float = 0.82
 ) -> tuple[Figure, list[Axes]]:
     """A figure of `count` like panels, three in a row, with room for a legend below."""
     across = min(3, count)
     down = -(-count // across)
-    made = figure(WIDTH, down * height + 0.55)
+    made = figure(WIDTH, down * height + bottom - 0.27)
     grid = made.add_gridspec(
         down,
         across,
         left=left,
         right=0.985,
-        top=1 - 0.25 / (down * height + 0.55),
-        bottom=0.82 / (down * height + 0.55),
+        top=1 - 0.25 / (down * height + bottom - 0.27),
+        bottom=bottom / (down * height + bottom - 0.27),
         hspace=0.45,
         wspace=0.28,
     )
