@@ -173,7 +173,7 @@ def small_multiples(
         down,
         across,
         left=left,
-        right=0.985,
+        right=0.975,
         top=1 - 0.25 / (down * height + bottom - 0.27),
         bottom=bottom / (down * height + bottom - 0.27),
         hspace=0.45,

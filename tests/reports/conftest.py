@@ -21,7 +21,7 @@ from benchmarks.results import (
 )
 from parapoint.parameterization import Parameterization, TracePoint
 from parapoint.surface import Mesh
-from reports import pictures, render, style
+from reports import clouds, pictures, render, style
 from reports.report import write
 
 HAND, DEVIL, NEFERTITI = "hand_1_i_f5000", "mannequin-devil", "nefertiti-lowres_odedstein"
@@ -91,7 +91,9 @@ class Writer:
 
 
 def draw_small(patch: pytest.MonkeyPatch) -> None:
-    """Small pictures and few rays."""
+    """Small pictures, few rays and few points."""
+    patch.setattr(clouds, "SPARSE", 400)
+    patch.setattr(clouds, "DENSE", 4000)
     patch.setattr(pictures, "SIZE", 48)
     patch.setattr(render, "OCCLUSION_RAYS", 0)
     patch.setattr(render, "FINE_FACES", 0)
