@@ -11,6 +11,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from benchmarks.results import ResultRow
+from parapoint.preparation import CUT
 from reports.contents import ANGLE, AREA, FLIPPED, Contents, Label
 from reports.pictures import (
     ANGLE_SCALE,
@@ -98,7 +99,7 @@ def models(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure:
 
 def is_cut(contents: Contents, case: str) -> bool:
     """Whether some method got the model with an automatic cut."""
-    return any(row.preprocessing for row in contents.rows if row.case == case)
+    return any(CUT in row.preprocessing for row in contents.rows if row.case == case)
 
 
 def disks(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure | None:
@@ -148,7 +149,7 @@ def cut_model(contents: Contents, case: str, pictures: Path) -> Figure | None:
         panels.append(("hand-made: the artist's map", "", artist))
     for label in chosen:
         row = contents.shown(case, label)
-        cut = "automatic cut" if row is not None and row.preprocessing else "learned seam"
+        cut = "automatic cut" if row is not None and CUT in row.preprocessing else "learned seam"
         shown = pictures_of(contents, case, label, ("checker-1", "layout"), pictures)
         text = values_text(contents, row) if row else ""
         panels.append((f"{label.name}, {cut}", text, shown))

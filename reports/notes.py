@@ -40,7 +40,7 @@ def method_notes(contents: Contents) -> list[str]:
             steps.setdefault(row.preprocessing, set()).add(row.case)
     for step, cases in steps.items():
         notes.append(
-            f"{step.capitalize()}, the same for every method that needs one: "
+            f"{step.capitalize()}, the same for every method that needs it: "
             f"{', '.join(sorted(cases))}."
         )
     return notes

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
+from parapoint.preparation import CUT
 from reports.contents import ANGLE, AREA, FLIPPED, SPANNING, Contents, Label, number
 from reports.notes import environment_note, failure_notes, legend, method_notes
 from reports.published import model
@@ -201,7 +202,7 @@ def _cut(record: Mapping[str, object]) -> str:
         return ""
     if (number(record, SPANNING) or 0) > 0:
         return "learned"
-    if record["preprocessing"]:
+    if CUT in str(record["preprocessing"]):
         return "automatic"
     return "its own" if (number(record, "seam_length") or 0) > 0 else "none"
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from parapoint.preparation import CUT
 from reports.contents import ANGLE, AREA, FLIPPED, SPANNING, Contents, number
 from reports.notes import environment_note, failure_notes, legend, method_notes
 from reports.published import AUTHORS, Verdict, claim_text, published_values, verdicts
@@ -128,7 +129,7 @@ def supplement(contents: Contents) -> Table:
             record = contents.records.get((case, label.short))
             if record is None:
                 continue
-            cut = " + automatic cut" if record["preprocessing"] else ""
+            cut = " + automatic cut" if CUT in str(record["preprocessing"]) else ""
             row: dict[str, Value] = {
                 "case": f"{case} ({claim_text(case)})" if authors else case,
                 "method": label.text + cut,
