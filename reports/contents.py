@@ -17,6 +17,7 @@ from benchmarks.metrics import METRICS
 from benchmarks.results import ResultRow, Store
 from benchmarks.suites import SUITES
 from parapoint.errors import InputError
+from parapoint.parameterization import Parameterization
 from parapoint.surface import Mesh
 
 ANGLE, AREA = "angle_difference_mean", "area_discrepancy_total"
@@ -210,6 +211,16 @@ class Contents:
                     return None
                 return surface if isinstance(surface, Mesh) else None
         return None
+
+    def mapped(self, row: ResultRow) -> tuple[Mesh, Parameterization] | None:
+        """The mesh of a cell and its map; None where one is damaged or they do not fit."""
+        try:
+            surface, result = self.store.surface(row), self.store.result(row)
+        except InputError:
+            return None
+        if not isinstance(surface, Mesh) or not isinstance(result, Parameterization):
+            return None
+        return (surface, result) if len(result.corners) == len(surface.faces) else None
 
     def has_artist(self, case: str) -> bool:
         """Whether the model came with a map of its own."""

@@ -385,7 +385,6 @@ def moved(found: Comparison) -> Table | None:
     blocks: dict[Key, list[Mapping[str, Value]]] = {}
     for move in [*found.moves, *found.times]:
         old, new = found.group(move.key)
-        sources = [{row.source_hash for row in group.rows.values()} for group in (old, new)]
         blocks.setdefault(move.key, []).append(
             {
                 **_named(found, move.key),
@@ -395,7 +394,7 @@ def moved(found: Comparison) -> Table | None:
                 "change": move.after - move.before,
                 "noise": move.noise,
                 "why": move.why,
-                "source": "same" if sources[0] == sources[1] else "changed",
+                "changed": _changed(old, new),
                 "verdict": move.verdict,
             }
         )
@@ -406,7 +405,7 @@ def moved(found: Comparison) -> Table | None:
         title="Beyond noise, cell by cell",
         caption=(
             "Every value that moved by more than its noise: means over the seeds that ended well. "
-            "Source: whether the method's own source is the same in both."
+            "Changed: the method's own source, or the surface it was given."
         ),
         columns=(
             *(replace(column, once=True) for column in _NAMES),
@@ -416,11 +415,20 @@ def moved(found: Comparison) -> Table | None:
             Column("change", "change", digits=4),
             Column("noise", "noise", digits=4),
             Column("why", "Noise from", text=True),
-            Column("source", "Source", text=True),
+            Column("changed", "Changed", text=True),
             Column("verdict", "Verdict", text=True),
         ),
         blocks=tuple(tuple(rows) for rows in blocks.values()),
     )
+
+
+def _changed(old: Group, new: Group) -> str:
+    """What is not the same before a cell ran."""
+    known = {"source": "source_hash", "surface": "surface_hash"}
+    sides = [[getattr(row, name) for row in old.rows.values()] for name in known.values()]
+    others = [[getattr(row, name) for row in new.rows.values()] for name in known.values()]
+    pairs = zip(known, sides, others, strict=True)
+    return ", ".join(name for name, one, two in pairs if set(one) != set(two)) or "nothing"
 
 
 def ended(found: Comparison) -> Table | None:

@@ -68,6 +68,11 @@ class Map:
         return MapState(self.mesh, self.parameterization)
 
     @property
+    def has_area(self) -> bool:
+        """Whether any face has an area in the plane: else there is nothing to see."""
+        return bool((self._state.triangles.uv_area != 0).any())
+
+    @property
     def spanning(self) -> BoolArray:
         """(F,) faces that span a learned seam."""
         return self._state.spanning
@@ -338,16 +343,20 @@ def draw_model(results: Path, rows: list[ResultRow], folder: Path) -> tuple[list
             failed += [map_file(row, kind) for kind in kinds(row)]
             faults.append(f"{case}, {row.method}: no pictures: {error}")
             continue
-        if isinstance(result, Parameterization) and len(result.corners) == len(surface.faces):
-            found = Map(surface, result)
-            made = dict(map_images(scene, views, found))
-            if CLOUD_PICTURES[0] in kinds(row):
-                made |= cloud_images(scene, views[0], found)
-            for kind, image in made.items():
-                save(image, folder / map_file(row, kind))
-        else:
+        fault = ""
+        if not isinstance(result, Parameterization) or len(result.corners) != len(surface.faces):
+            fault = "the map is not of this mesh"
+        elif not (found := Map(surface, result)).has_area:
+            fault = "the map has no area"
+        if fault:
             failed += [map_file(row, kind) for kind in kinds(row)]
-            faults.append(f"{case}, {row.method}: no pictures: the map is not of this mesh")
+            faults.append(f"{case}, {row.method}: no pictures: {fault}")
+            continue
+        made = dict(map_images(scene, views, found))
+        if CLOUD_PICTURES[0] in kinds(row):
+            made |= cloud_images(scene, views[0], found)
+        for kind, image in made.items():
+            save(image, folder / map_file(row, kind))
     return failed, faults
 
 

@@ -18,7 +18,7 @@ from benchmarks.metrics import MapState
 from benchmarks.results import ResultRow
 from parapoint.errors import InputError
 from parapoint.parameterization import Parameterization
-from parapoint.surface import FloatArray, Mesh
+from parapoint.surface import FloatArray
 from reports.contents import ANGLE, AREA, Contents, Label
 from reports.galleries import leading
 from reports.style import COLOURS, DASHES, legend_below, look, plain_log, small_multiples, wrapped
@@ -75,12 +75,10 @@ def trace_of(contents: Contents, row: ResultRow) -> pd.DataFrame:
 
 def quality_trace(contents: Contents, row: ResultRow) -> pd.DataFrame:
     """Angle and area distortion over all faces along the way, where the maps were kept."""
-    try:
-        result, surface = contents.store.result(row), contents.store.surface(row)
-    except InputError:
+    mapped = contents.mapped(row)
+    if mapped is None:
         return pd.DataFrame()
-    if not isinstance(result, Parameterization) or not isinstance(surface, Mesh):
-        return pd.DataFrame()
+    surface, result = mapped
     records = []
     for at in result.trace:
         if at.uv is not None and len(at.uv) == len(result.uv):
@@ -182,18 +180,17 @@ def pareto(contents: Contents, cases: Sequence[str]) -> Figure | None:
 def singular_values(contents: Contents, cases: Sequence[str]) -> Figure | None:
     """How much of the surface is stretched by how much: both singular values, method by method."""
     cases = [case for case in cases if any(contents.shown(case, m) for m in contents.methods)]
-    surfaces = {case: mesh for case in cases if (mesh := contents.mesh(case)) is not None}
-    if not surfaces:
+    if not cases:
         return None
     labels = contents.methods
     tall = 0.33 * len(labels) + 0.8
-    made, places = small_multiples(len(surfaces), tall, left=0.21, bottom=0.5)
+    made, places = small_multiples(len(cases), tall, left=0.21, bottom=0.5)
     bins = np.linspace(-5, 5, 81)
     middle = (bins[1:] + bins[:-1]) / 2
-    for number, (place, (case, surface)) in enumerate(zip(places, surfaces.items(), strict=True)):
+    for number, (place, case) in enumerate(zip(places, cases, strict=True)):
         for line, label in enumerate(labels):
             row = contents.shown(case, label)
-            sigmas = singular_value_shares(contents, surface, row, bins) if row else None
+            sigmas = singular_value_shares(contents, row, bins) if row else None
             y = len(labels) - 1 - line
             if sigmas is None:
                 place.text(0, y + 0.1, "no map", ha="center", fontsize=6.5, color="0.5")
@@ -218,16 +215,13 @@ def singular_values(contents: Contents, cases: Sequence[str]) -> Figure | None:
 
 
 def singular_value_shares(
-    contents: Contents, surface: Mesh, row: ResultRow, bins: FloatArray
+    contents: Contents, row: ResultRow, bins: FloatArray
 ) -> FloatArray | None:
     """(2, n) shares of the area by log2 of each singular value; None without a map of the mesh."""
-    try:
-        result = contents.store.result(row)
-    except InputError:
+    mapped = contents.mapped(row)
+    if mapped is None:
         return None
-    if not isinstance(result, Parameterization):
-        return None
-    found = MapState(surface, result).distortion_without_spanning
+    found = MapState(*mapped).distortion_without_spanning
     shares = []
     for sigma in (found.sigma1, found.sigma2):
         known = found.finite & (sigma > 0)

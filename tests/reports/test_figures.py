@@ -104,7 +104,7 @@ def test_singular_values_of_an_isometry_peak_at_one(tmp_path):
         writer.cell(HAND, plane, "lscm", {}, result=flat(plane))
     suite = contents(tmp_path)[0]
     bins = np.linspace(-5, 5, 81)
-    shares = plots.singular_value_shares(suite, plane, suite.rows[0], bins)
+    shares = plots.singular_value_shares(suite, suite.rows[0], bins)
     np.testing.assert_allclose(shares.sum(axis=1), 1)
     for share in shares:
         assert share.max() == pytest.approx(1)

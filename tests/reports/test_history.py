@@ -121,7 +121,7 @@ def test_times_move_beyond_a_quarter_and_a_tenth_of_a_second(tmp_path):
     assert [(move.key[2], move.verdict) for move in found.times] == [("lscm", "worse")]
     (row,) = moved(found).blocks[0]
     assert row["metric"] == "time [s]"
-    assert row["source"] == "same"
+    assert row["changed"] == "nothing"
 
 
 def test_other_ends_and_lone_cells_are_listed_with_the_reason(tmp_path):

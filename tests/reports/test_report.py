@@ -6,14 +6,16 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from parapoint import console
+from parapoint.parameterization import Parameterization
 from reports.__main__ import main
 from reports.contents import contents
 from reports.report import write
 
-from .conftest import HAND, Writer, sheet
+from .conftest import HAND, SLIM, Writer, flat, sheet
 
 VOID = {"meta", "img", "br", "link", "input", "hr"}
 
@@ -105,6 +107,22 @@ def test_a_half_written_folder_is_reported_without_what_is_lost(results, tmp_pat
     page = parsed(write(folder, jobs=1))
     assert "environment not recorded" in page.text
     assert "no pictures" in page.text
+
+
+def test_maps_that_do_not_fit_or_have_no_area_are_told_and_the_rest_is_reported(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        one = writer.cell("one", sheet(), "slim", SLIM, result=flat(sheet(), 0.3))
+        two = writer.cell("two", sheet(5), "slim", SLIM, result=flat(sheet(5)))
+        nothing = Parameterization(np.zeros((81, 2)), sheet().faces)
+        writer.cell("three", sheet(), "slim", SLIM, result=nothing)
+    paths = [writer.store.uv_path(row.id) for row in (one, two)]
+    contents_of = [path.read_bytes() for path in paths]
+    for path, content in zip(paths, contents_of[::-1], strict=True):
+        path.write_bytes(content)
+    text = parsed(write(tmp_path, jobs=1)).text
+    assert text.count("the map is not of this mesh") == 2
+    assert text.count("the map has no area") == 1
 
 
 def test_a_user_s_file_and_two_suites(tmp_path):
