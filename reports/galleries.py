@@ -185,7 +185,7 @@ def ablation(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure
     for column, label in enumerate(labels):
         x = left + column * (side + gap)
         words = wrapped(label.short.removeprefix(f"{label.name} "), 17)
-        words = "as in the paper" if label.short == label.name else words
+        words = "unchanged" if label.short == label.name else words
         made.text((x + side / 2) / WIDTH, 1 - 0.05 / height, words, ha="center", va="top")
         for number, case in enumerate(cases):
             y = height - top - number * (2 * side + foot)

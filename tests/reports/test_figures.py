@@ -170,7 +170,7 @@ def test_an_ablation_shows_every_variant_and_the_paper_s_four(tmp_path):
     names = [one.name for one in drawings(suite, tmp_path)]
     assert {"ablation", "ablation-paper"} <= set(names)
     found = texts(galleries.ablation(suite, tmp_path, suite.cases))
-    assert {"as in the paper", "isometric", "2D→3D→2D alone"} <= set(found)
+    assert {"unchanged", "isometric", "2D→3D→2D alone"} <= set(found)
     four = texts(galleries.ablation_of_the_paper(suite, tmp_path))
     assert "(a) cube, conformal" in four
     assert "(d) eight, 3D→2D→3D alone" in four
