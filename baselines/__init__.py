@@ -31,8 +31,12 @@ Run it, as it is or with other parameters:
 
 Check it: `parapoint.testing.check_method(Planar())` raises at the first promise that is broken.
 
-To share it, make it a package that names it in its `pyproject.toml`; wherever the package is
-installed, `planar` is then a method like any other:
+To share it, put this `pyproject.toml` beside it; wherever the folder is installed (`pip install
+./planar`), `planar` is then a method like any other:
+
+    [project]
+    name = "planar"
+    version = "1.0"
 
     [project.entry-points."parapoint.methods"]
     planar = "planar:Planar"
@@ -48,9 +52,10 @@ What a method may count on, and what it must keep:
   of the surface. Scale, rotation and mirrored charts are free.
 - Every random draw comes from `seed`: the same cell gives the same map, bit by bit, on one
   machine. A method that cannot promise it says `deterministic: ClassVar[bool] = False`.
-- Only `parameterize` is timed: import libraries at the top of the file. One that need not be
-  installed is imported by `baselines.optional.optional`, so that its rows are `skipped` and say
-  what to install.
+- Only `parameterize` is timed: import libraries at the top of the file, and what takes seconds to
+  import or start in a method `load(self)`, which is called before the clock. One that need not be
+  installed is imported by `baselines.optional.optional`, so that its rows are `skipped`, say what
+  to install, and are tried again by the next run.
 - Raise `UnsupportedError` for what the method cannot take though `requires` admits it (`skipped`);
   any other error is a `failed` row with its message.
 - `trace` may hold energies and maps on the way; `report` what should stand beside the result.

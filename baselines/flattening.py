@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import igl
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
@@ -48,9 +49,8 @@ def domain(surface: Surface) -> Domain:
         row = np.cumsum(surface.referenced) - 1
         vertices, faces, loop = vertices[surface.referenced], row[faces], row[loop]
     along = (faces == loop[0]) & (np.roll(faces, -1, axis=1) == loop[1])
-    return Domain(
-        vertices, faces, loop if along.any() else loop[::-1], float(surface.face_areas.sum())
-    )
+    area = float(igl.doublearea(vertices, faces).sum()) / 2
+    return Domain(vertices, faces, loop if along.any() else loop[::-1], area)
 
 
 def closed_holes(disk: Domain) -> tuple[FloatArray, IntArray]:

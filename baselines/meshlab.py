@@ -7,6 +7,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from baselines.atlas import joined_corners
 from baselines.flattening import FlatteningError, check_triangles, domain, scaled
 from baselines.optional import optional
 from parapoint.method import UnsupportedError
@@ -194,10 +195,3 @@ def matched_faces(mesh: Mesh, triangles: FloatArray) -> tuple[IntArray, IntArray
         raise FlatteningError(f"MeshLab's atlas left out {int(lost.sum())} of {count} faces")
     face = row[place]
     return face, (first[count:][face] - first[:count]) % 3
-
-
-def joined_corners(mesh: Mesh, uv: FloatArray) -> Parameterization:
-    """The map with one row for all corners that have the same vertex and the same uv (F, 3, 2)."""
-    key = np.concatenate([mesh.faces.reshape(-1, 1), uv.reshape(-1, 2)], axis=1)
-    rows, corners = np.unique(key, axis=0, return_inverse=True)
-    return Parameterization(rows[:, 1:], corners.reshape(-1, 3))

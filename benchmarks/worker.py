@@ -45,6 +45,7 @@ import scipy.sparse.linalg  # noqa: F401  as above
 
 from baselines import registry
 from benchmarks.results import (
+    MISSING,
     SOURCE_CHANGED,
     arrays_hash,
     map_arrays,
@@ -55,7 +56,7 @@ from benchmarks.results import (
     trace_arrays,
     write_arrays,
 )
-from parapoint.method import UnsupportedError
+from parapoint.method import MissingError, UnsupportedError
 from parapoint.parameterization import Parameterization, PointParameterization
 from parapoint.preparation import prepared
 from parapoint.surface import Mesh, Surface
@@ -222,11 +223,14 @@ def _outcome(job: dict[str, Any]) -> Outcome:
     try:
         preparation = prepared(whole, method.requires)
         preprocessing = preparation.steps
+        if hasattr(method, "load"):
+            method.load()
         before, wall = os.times(), time.perf_counter()
         maps = preparation.maps(method, job["seed"])
         wall, after = time.perf_counter() - wall, os.times()
     except UnsupportedError as error:
-        return {"status": "skipped", "reason": _line(error), "preprocessing": preprocessing}
+        reason = MISSING * isinstance(error, MissingError) + _line(error)
+        return {"status": "skipped", "reason": reason, "preprocessing": preprocessing}
     except Exception as error:  # noqa: BLE001  as in _perform; the row says what was done before
         traceback.print_exc()
         return _failure(error) | {"preprocessing": preprocessing}

@@ -13,6 +13,9 @@ from parapoint.surface import PointCloud, Surface
 class Method(Protocol):
     """A parameterization method: a dataclass whose fields are its hyperparameters.
 
+    It may have a method `load()`, called once before `parameterize` is timed: there it imports or
+    starts what is slow to come, and raises MissingError where that is not installed.
+
     Attributes:
         requires: what the surface must be, words of `REQUIREMENTS`. Empty: a mesh or a point cloud.
     """
@@ -31,6 +34,13 @@ class Method(Protocol):
 
 class UnsupportedError(Exception):
     """A method cannot take a surface; the message says why. The cell is `skipped`."""
+
+
+class MissingError(UnsupportedError):
+    """A method needs a package or program that is not there; the message says how to get it.
+
+    The cell is `skipped`, and the next run tries it again.
+    """
 
 
 def _not_a_mesh(surface: Surface) -> str | None:

@@ -62,11 +62,9 @@ def edge_table(triangles: IntArray) -> tuple[IntArray, IntArray, IntArray]:
 
 def flat_faces(vertices: FloatArray, faces: IntArray) -> BoolArray:
     """(F,) which triangles have no area beyond rounding: no cotangent, gradient or normal."""
-    corners = vertices[faces]
-    sides = corners - np.roll(corners, 1, axis=1)
-    longest = (sides**2).sum(axis=2).max(axis=1)
-    double_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    return np.asarray(double_area <= 8 * np.finfo(np.float64).eps * longest)
+    longest = igl.squared_edge_lengths(vertices, faces).max(axis=1)
+    flat = igl.doublearea(vertices, faces) <= 8 * np.finfo(np.float64).eps * longest
+    return np.asarray(flat, dtype=bool)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from parapoint.cutting import cut_along
-from parapoint.method import REQUIREMENTS, Method, UnsupportedError
+from parapoint.method import REQUIREMENTS, Method, MissingError, UnsupportedError
 from parapoint.parameterization import Parameterization, PointParameterization
 from parapoint.preparation import prepared
 from parapoint.surface import FloatArray, IntArray, Mesh, PointCloud, Surface
@@ -37,8 +37,8 @@ def check_method(method: Method, surface: Surface | None = None) -> None:
 
     Raises:
         AssertionError: a promise is broken; the message says which, and on which surface.
-        UnsupportedError: nothing could be checked, as the method refuses every surface (a package
-            that it needs is missing, say).
+        MissingError: a package or program that the method needs is not there.
+        UnsupportedError: nothing could be checked, as the method refuses every surface.
     """
     name = type(method).__name__
     _check_declaration(method, name)
@@ -58,6 +58,8 @@ def check_method(method: Method, surface: Surface | None = None) -> None:
             maps = [_check_run(method, part, where) for part in preparation.parts]
             if not checked and getattr(method, "deterministic", True):
                 _check_repeat(method, preparation.parts[0], maps[0], where)
+        except MissingError:
+            raise
         except UnsupportedError as error:
             refusal = error
             if checked:
