@@ -12,11 +12,12 @@ from parapoint import console
 
 @click.command(help="Write tables, figures and index.html for the results in DIR to DIR/report.")
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-def main(folder: Path) -> None:
+@click.option("--exports", is_flag=True, help="Every map as a textured OBJ and GLB, too.")
+def main(folder: Path, exports: bool) -> None:
     """Write the report, and say where it is."""
     from reports.report import write
 
-    print(write(folder, jobs=cores()))
+    print(write(folder, jobs=cores(), textured=exports))
 
 
 if __name__ == "__main__":

@@ -77,6 +77,9 @@ STYLE: dict[Any, Any] = {
 WIDTH = 7.0
 """Width of a figure, inches."""
 
+SHEETS = 12
+"""Most models of a suite for which each gets figures of its own; the page shows all models."""
+
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#7F7F7F", "#8C6D1F", "#000000")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 DASHES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
@@ -165,7 +168,10 @@ def put(place: Axes, path: Path) -> None:
             box = place.get_window_extent()
             scale = STYLE["savefig.dpi"] / mpl.rcParams["figure.dpi"]
             image.thumbnail((round(box.width * scale), round(box.height * scale)))
-            place.imshow(np.asarray(image), interpolation="bilinear")
+            # On white: a PDF would hold the transparency beside each picture.
+            page = Images.new("RGBA", image.size, "white")
+            page.alpha_composite(image.convert("RGBA"))
+            place.imshow(np.asarray(page.convert("RGB")), interpolation="bilinear")
     except OSError:
         note(place, "no picture")
 
@@ -526,13 +532,14 @@ def _convergence(contents: Contents, name: str, metric: str, title: str) -> Figu
             if len(found) < 2:
                 value = contents.measured.loc[contents.measured["id"] == row.id, metric]
                 found = pd.DataFrame({"seconds": [row.seconds], name: [float(value.iloc[0])]})
-            curves.setdefault(case, []).append((label, found))
+            known = found[np.isfinite(found[name]) & (found["seconds"] > 0)]
+            if len(known):  # a map of points has neither angles nor areas of faces
+                curves.setdefault(case, []).append((label, known))
     if not traced:
         return None
     made, places = small_multiples(len(curves))
     for place, (case, lines) in zip(places, curves.items(), strict=True):
-        for label, found in lines:
-            known = found[np.isfinite(found[name]) & (found["seconds"] > 0)]
+        for label, known in lines:
             place.plot(
                 known["seconds"], known[name], label=label.short, markersize=3.5,
                 **look(contents, label),
@@ -731,7 +738,8 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
             partial(cost, contents),
         ),
     ]  # fmt: skip
-    for case in contents.cases:
+    sheets = contents.cases if len(contents.cases) <= SHEETS else []
+    for case in sheets:
         rows = tuple(row for row in contents.rows if row.case == case)
         if any(row.status == "ok" for row in rows):
             found += [

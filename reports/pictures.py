@@ -27,12 +27,12 @@ from benchmarks.results import ResultRow, Store
 from parapoint.errors import InputError
 from parapoint.parameterization import Parameterization
 from parapoint.surface import BoolArray, FloatArray, Mesh
-from reports import render
+from reports import render, viewer
 from reports.contents import Contents
 from reports.render import Camera, Floats, Image, Scene, View
 
-SIZE, SAMPLES = 560, 2
-"""Longer side of a picture in pixels (shown at about half that), and samples along a pixel."""
+SIZE, SAMPLES = 360, 2
+"""Longer side of a picture in pixels (what the largest figure prints), samples along a pixel."""
 
 FIELDS = 44
 """Fields of the checkerboard along the diagonal of a model's bounding box."""
@@ -209,16 +209,22 @@ def normal_colours(scene: Scene, camera: Camera) -> Floats:
 
 MODEL_PICTURES = ("mesh-1", "mesh-2")
 MAP_PICTURES = ("checker-1", "checker-2", "layout", "angle", "angle-uv", "area", "area-uv")
+VIEWED = "view"
+"""Kind of the file beside the pictures that the viewer reads, of a model and of a map."""
 
 
 def model_file(case: str, kind: str) -> str:
-    """File name of a picture of a model."""
-    return f"{slug(case)}.{kind}.png"
+    """File name of a picture of a model, or of what the viewer reads."""
+    return f"{slug(case)}.{kind}.{_ending(kind)}"
 
 
 def map_file(row: ResultRow, kind: str) -> str:
-    """File name of a picture of a map."""
-    return f"{slug(row.case)}.{slug(row.method)}.{row.id[:8]}.{kind}.png"
+    """File name of a picture of a map, or of what the viewer reads."""
+    return f"{slug(row.case)}.{slug(row.method)}.{row.id[:8]}.{kind}.{_ending(kind)}"
+
+
+def _ending(kind: str) -> str:
+    return "js" if kind == VIEWED else "webp"
 
 
 def source_hash(*modules: str) -> str:
@@ -238,7 +244,7 @@ def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
     folder.mkdir(parents=True, exist_ok=True)
     record = folder / "keys.json"
     known = known_keys(record)
-    source = source_hash("render", "pictures")
+    source = source_hash("render", "pictures", "viewer")
     work: list[list[ResultRow]] = []
     keys: dict[str, str] = {}
     for case in contents.cases:
@@ -247,10 +253,11 @@ def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
             continue
         todo = []
         latest = rows[-1]
-        wanted = {model_file(case, kind): (latest, "") for kind in MODEL_PICTURES}
+        wanted = {model_file(case, kind): (latest, "") for kind in (*MODEL_PICTURES, VIEWED)}
         for row in rows:
             if row.status == "ok":
-                wanted |= {map_file(row, kind): (row, row.uv_sha256) for kind in MAP_PICTURES}
+                kinds = (*MAP_PICTURES, VIEWED)
+                wanted |= {map_file(row, kind): (row, row.uv_sha256) for kind in kinds}
         for name, (row, content) in wanted.items():
             text = f"{source} {row.surface_hash} {content}"
             keys[name] = hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -307,6 +314,7 @@ def draw_model(results: Path, rows: list[ResultRow], folder: Path) -> tuple[list
     views = [scene.view(camera, SIZE, SAMPLES) for camera in cameras]
     for name, view in zip(files, views, strict=True):
         save(meshed(view), folder / name)
+    _write_script(folder / model_file(case, VIEWED), viewer.shape(surface, cameras[0]))
     failed, faults = [], []
     for row in rows:
         if row.status != "ok":
@@ -318,8 +326,10 @@ def draw_model(results: Path, rows: list[ResultRow], folder: Path) -> tuple[list
             faults.append(f"{case}, {row.method}: no pictures: {error}")
             continue
         if isinstance(result, Parameterization) and len(result.corners) == len(surface.faces):
-            for kind, image in map_images(scene, views, Map(surface, result)).items():
+            found = Map(surface, result)
+            for kind, image in map_images(scene, views, found).items():
                 save(image, folder / map_file(row, kind))
+            _write_script(folder / map_file(row, VIEWED), _viewed(found))
         else:
             failed += [map_file(row, kind) for kind in MAP_PICTURES]
             faults.append(f"{case}, {row.method}: no pictures: the map is not of this mesh")
@@ -342,6 +352,25 @@ def map_images(scene: Scene, views: list[View], found: Map) -> Mapping[str, Imag
     }
 
 
+def _viewed(found: Map) -> dict[str, object]:
+    """A map as the viewer draws it."""
+    return viewer.uv_map(
+        found.mesh,
+        found.parameterization,
+        found.uv,
+        distortion={
+            "angle": (found.angle, *ANGLE_SCALE[1:]),
+            "area": (found.area, *AREA_SCALE[1:]),
+        },
+        spanning=found.spanning,
+        flipped=found.flipped,
+    )
+
+
+def _write_script(path: Path, content: dict[str, object]) -> None:
+    path.write_text(viewer.script(path.name, content), encoding="utf-8")
+
+
 def save(image: npt.NDArray[np.uint8], path: Path) -> None:
-    """Write `image` as a PNG: the same image gives the same bytes."""
-    Images.fromarray(image).save(path, format="PNG", compress_level=4)
+    """Write `image` as WebP, a quarter of a PNG: the same image gives the same bytes."""
+    Images.fromarray(image).save(path, format="WebP", quality=90, method=4)

@@ -351,7 +351,7 @@ def method_notes(contents: Contents) -> list[str]:
     return notes
 
 
-def _metric(name: str, title: str = "", **given: object) -> Column:
+def metric_column(name: str, title: str = "", **given: object) -> Column:
     """The column of a metric; `seconds` counts as one."""
     if name == "seconds":
         return Column("seconds", title or "time [s]", better="lower", digits=2)
@@ -463,15 +463,15 @@ def supplement(contents: Contents) -> Table:
     columns = [
         Column("case", "Model", text=True, once=True),
         Column("method", "Method", text=True),
-        _metric(ANGLE, "all faces", group="Angle difference [rad]"),
-        _metric(without, "no spanning", group="Angle difference [rad]"),
-        _metric(AREA, "all faces", group="Area discrepancy [0–2]"),
-        _metric(area_without, "no spanning", group="Area discrepancy [0–2]"),
-        _metric(FLIPPED, "flipped %"),
+        metric_column(ANGLE, "all faces", group="Angle difference [rad]"),
+        metric_column(without, "no spanning", group="Angle difference [rad]"),
+        metric_column(AREA, "all faces", group="Area discrepancy [0–2]"),
+        metric_column(area_without, "no spanning", group="Area discrepancy [0–2]"),
+        metric_column(FLIPPED, "flipped %"),
         Column(SPANNING, "spanning %", digits=2, percent=True),
         Column("chart_count", "charts", digits=0),
         Column("seam_length", "seam", digits=2),
-        _metric("seconds"),
+        metric_column("seconds"),
         Column("done", "ok", text=True),
     ]
     authors = [
@@ -570,7 +570,7 @@ def comparison(contents: Contents, names: Sequence[str] = ()) -> Table:
         if name not in means.columns or not good[name].notna().any():
             continue
         rows: list[dict[str, Value]] = []
-        column = _metric(name)
+        column = metric_column(name)
         for label in contents.methods:
             own = good[good["label"] == label.short]
             values = own[name].dropna()
@@ -626,7 +626,7 @@ def _scaled(column: Column, key: str, value: float | None) -> dict[str, Value]:
 
 
 def _metric_title(name: str) -> str:
-    column = _metric(name)
+    column = metric_column(name)
     unit = "" if name == "seconds" or not METRICS[name].unit else f" [{METRICS[name].unit}]"
     return f"{column.title}{' %' if column.percent else unit}"
 
@@ -730,7 +730,7 @@ def everything(contents: Contents) -> Table:
             Column("method", "Method", text=True),
             Column("seed", "seed", digits=0),
             Column("status", "status", text=True),
-            *(_metric(name) for name in names),
+            *(metric_column(name) for name in names),
         ),
         blocks=(rows,),
         notes=(environment_note(contents),),

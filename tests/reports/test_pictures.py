@@ -63,7 +63,7 @@ def test_a_face_without_uv_area_has_the_worst_colour():
 def test_pictures_are_drawn_once_and_again_when_something_changed(results, tmp_path):
     suite = contents(results)[0]
     assert draw(suite, tmp_path, 1) == []
-    files = sorted(path.name for path in tmp_path.glob("*.png"))
+    files = sorted(path.name for path in tmp_path.glob("*.webp"))
     assert len(files) == 3 * 2 + 7 * 7
     before = {name: (tmp_path / name).read_bytes() for name in files}
     stamps = {name: (tmp_path / name).stat().st_mtime_ns for name in files}
@@ -97,4 +97,4 @@ def test_a_damaged_map_is_told_and_the_rest_drawn(results, tmp_path):
     faults = draw(suite, tmp_path / "pictures", 1)
     assert len(faults) == 1
     assert "damaged" in faults[0]
-    assert len(list((tmp_path / "pictures").glob("*.png"))) == 3 * 2 + 6 * 7
+    assert len(list((tmp_path / "pictures").glob("*.webp"))) == 3 * 2 + 6 * 7
