@@ -43,6 +43,7 @@ from reports.contents import Contents, Label
 from reports.pictures import (
     ANGLE_SCALE,
     AREA_SCALE,
+    SHEETS,
     known_keys,
     map_file,
     model_file,
@@ -76,9 +77,6 @@ STYLE: dict[Any, Any] = {
 
 WIDTH = 7.0
 """Width of a figure, inches."""
-
-SHEETS = 12
-"""Most models of a suite for which each gets figures of its own; the page shows all models."""
 
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#7F7F7F", "#8C6D1F", "#000000")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
@@ -815,5 +813,8 @@ def write(folder: Path, drawing: Drawing) -> None:
             for file in files:
                 file.unlink(missing_ok=True)
             return
-        made.savefig(files[0], metadata={"CreationDate": None, "Title": drawing.title})
-        made.savefig(files[1], metadata={"Title": drawing.title})
+        # A sheet of many pictures need not be as fine as a figure: they are most of the weight.
+        sheet = drawing.name.startswith(("maps-", "heat-"))
+        dpi = STYLE["savefig.dpi"] * (0.7 if sheet else 1.0)
+        made.savefig(files[0], dpi=dpi, metadata={"CreationDate": None, "Title": drawing.title})
+        made.savefig(files[1], dpi=dpi, metadata={"Title": drawing.title})

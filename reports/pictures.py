@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
@@ -208,7 +208,12 @@ def normal_colours(scene: Scene, camera: Camera) -> Floats:
 
 
 MODEL_PICTURES = ("mesh-1", "mesh-2")
-MAP_PICTURES = ("checker-1", "checker-2", "layout", "angle", "angle-uv", "area", "area-uv")
+TEXTURED_PICTURES = ("checker-1", "checker-2", "layout")
+HEAT_PICTURES = ("angle", "angle-uv", "area", "area-uv")
+MAP_PICTURES = (*TEXTURED_PICTURES, *HEAT_PICTURES)
+SHEETS = 12
+"""Most models of a suite for which each gets figures of its own, and so pictures of its heat."""
+
 VIEWED = "view"
 """Kind of the file beside the pictures that the viewer reads, of a model and of a map."""
 
@@ -245,6 +250,7 @@ def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
     record = folder / "keys.json"
     known = known_keys(record)
     source = source_hash("render", "pictures", "viewer")
+    kinds = MAP_PICTURES if len(contents.cases) <= SHEETS else TEXTURED_PICTURES
     work: list[list[ResultRow]] = []
     keys: dict[str, str] = {}
     for case in contents.cases:
@@ -256,8 +262,8 @@ def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
         wanted = {model_file(case, kind): (latest, "") for kind in (*MODEL_PICTURES, VIEWED)}
         for row in rows:
             if row.status == "ok":
-                kinds = (*MAP_PICTURES, VIEWED)
-                wanted |= {map_file(row, kind): (row, row.uv_sha256) for kind in kinds}
+                names = (map_file(row, kind) for kind in (*kinds, VIEWED))
+                wanted |= dict.fromkeys(names, (row, row.uv_sha256))
         for name, (row, content) in wanted.items():
             text = f"{source} {row.surface_hash} {content}"
             keys[name] = hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -266,11 +272,13 @@ def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
         if todo:
             work.append(todo)
     faults: list[str] = []
-    for failed, said in _results(contents.store, work, folder, jobs):
+    for failed, said in _results(contents.store, work, folder, kinds, jobs):
         faults += said
         for name in failed:
             keys.pop(name, None)
-    record.write_text(json.dumps(known | keys, indent=0, sort_keys=True) + "\n")
+    for name in known.keys() - keys.keys():  # of a cell that gave way to a newer one
+        (folder / name).unlink(missing_ok=True)
+    record.write_text(json.dumps(keys, indent=0, sort_keys=True) + "\n")
     return faults
 
 
@@ -284,31 +292,33 @@ def known_keys(record: Path) -> dict[str, str]:
 
 
 def _results(
-    store: Store, work: list[list[ResultRow]], folder: Path, jobs: int
+    store: Store, work: list[list[ResultRow]], folder: Path, kinds: Sequence[str], jobs: int
 ) -> Iterator[tuple[list[str], list[str]]]:
     if jobs <= 1 or len(work) <= 1:
         for rows in work:
-            yield draw_model(store.folder, rows, folder)
+            yield draw_model(store.folder, rows, folder, kinds)
         return
     with ProcessPoolExecutor(min(jobs, len(work)), mp_context=get_context("spawn")) as pool:
-        pending = [pool.submit(draw_model, store.folder, rows, folder) for rows in work]
+        pending = [pool.submit(draw_model, store.folder, rows, folder, kinds) for rows in work]
         for done in pending:
             yield done.result()
 
 
-def draw_model(results: Path, rows: list[ResultRow], folder: Path) -> tuple[list[str], list[str]]:
+def draw_model(
+    results: Path, rows: list[ResultRow], folder: Path, kinds: Sequence[str] = MAP_PICTURES
+) -> tuple[list[str], list[str]]:
     """Draw a model and the maps of `rows`; the files that could not be drawn, and why."""
     store = Store(results)
     case = rows[0].case
     files = [model_file(case, kind) for kind in MODEL_PICTURES]
+    everything = [*files, model_file(case, VIEWED)]
+    everything += [map_file(row, kind) for row in rows for kind in (*kinds, VIEWED)]
     try:
         surface = store.surface(rows[-1])
     except InputError as error:
-        files += [map_file(row, kind) for row in rows for kind in MAP_PICTURES]
-        return files, [f"{case}: no pictures: {error}"]
+        return everything, [f"{case}: no pictures: {error}"]
     if not isinstance(surface, Mesh):
-        files += [map_file(row, kind) for row in rows for kind in MAP_PICTURES]
-        return files, [f"{case}: a point cloud; only meshes are drawn"]
+        return everything, [f"{case}: a point cloud; only meshes are drawn"]
     scene = Scene(surface)
     cameras = render.two_cameras(scene)
     views = [scene.view(camera, SIZE, SAMPLES) for camera in cameras]
@@ -322,29 +332,35 @@ def draw_model(results: Path, rows: list[ResultRow], folder: Path) -> tuple[list
         try:
             result = store.result(row)
         except InputError as error:
-            failed += [map_file(row, kind) for kind in MAP_PICTURES]
+            failed += [map_file(row, kind) for kind in (*kinds, VIEWED)]
             faults.append(f"{case}, {row.method}: no pictures: {error}")
             continue
         if isinstance(result, Parameterization) and len(result.corners) == len(surface.faces):
             found = Map(surface, result)
-            for kind, image in map_images(scene, views, found).items():
+            for kind, image in map_images(scene, views, found, kinds).items():
                 save(image, folder / map_file(row, kind))
             _write_script(folder / map_file(row, VIEWED), _viewed(found))
         else:
-            failed += [map_file(row, kind) for kind in MAP_PICTURES]
+            failed += [map_file(row, kind) for kind in (*kinds, VIEWED)]
             faults.append(f"{case}, {row.method}: no pictures: the map is not of this mesh")
     return failed, faults
 
 
-def map_images(scene: Scene, views: list[View], found: Map) -> Mapping[str, Image]:
+def map_images(
+    scene: Scene, views: list[View], found: Map, kinds: Sequence[str] = MAP_PICTURES
+) -> Mapping[str, Image]:
     """The pictures of a map by their kind."""
     first, second = views
     layout = Layout(found)
-    angle, area = heat(found.angle, ANGLE_SCALE), heat(found.area, AREA_SCALE)
-    return {
+    images = {
         "checker-1": textured(first, found),
         "checker-2": textured(second, found),
         "layout": layout.image(normal_colours(scene, first.camera)),
+    }
+    if not set(HEAT_PICTURES) & set(kinds):
+        return images
+    angle, area = heat(found.angle, ANGLE_SCALE), heat(found.area, AREA_SCALE)
+    return images | {
         "angle": first.image(angle[first.face]),
         "angle-uv": layout.image(angle),
         "area": first.image(area[first.face]),
@@ -373,4 +389,4 @@ def _write_script(path: Path, content: dict[str, object]) -> None:
 
 def save(image: npt.NDArray[np.uint8], path: Path) -> None:
     """Write `image` as WebP, a quarter of a PNG: the same image gives the same bytes."""
-    Images.fromarray(image).save(path, format="WebP", quality=90, method=4)
+    Images.fromarray(image).save(path, format="WebP", quality=85, method=4)

@@ -1,3 +1,4 @@
+import json
 import shutil
 
 import numpy as np
@@ -68,7 +69,11 @@ def test_pictures_are_drawn_once_and_again_when_something_changed(results, tmp_p
     before = {name: (tmp_path / name).read_bytes() for name in files}
     stamps = {name: (tmp_path / name).stat().st_mtime_ns for name in files}
     (tmp_path / files[0]).unlink()
+    record = tmp_path / "keys.json"
+    record.write_text(json.dumps(json.loads(record.read_text()) | {"gone.webp": "0"}))
+    (tmp_path / "gone.webp").touch()  # of a cell that gave way
     draw(suite, tmp_path, 1)
+    assert not (tmp_path / "gone.webp").exists()
     other = [name for name in files if name.split(".")[0] != files[0].split(".")[0]]
     assert {name: (tmp_path / name).read_bytes() for name in files} == before
     assert all((tmp_path / name).stat().st_mtime_ns == stamps[name] for name in other)
