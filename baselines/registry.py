@@ -38,6 +38,8 @@ METHODS: dict[str, str] = {
     "meshlab_triangles": "baselines.meshlab:MeshLabTriangles",
     "external": "baselines.external:External",
     "parapoint": "parapoint.estimator:ParaPoint",
+    "fam": "baselines.fam:FAM",
+    "nuvo": "baselines.nuvo:Nuvo",
 }
 """Name -> "module:Class" of each method that comes with the benchmark."""
 

@@ -19,6 +19,8 @@ COPY = (  # an external program: every vertex to its x and y
 )
 ARGUMENTS = {
     "external": {"command": COPY},
+    "fam": {"points": 120, "subset": 100, "iterations": 2},
+    "nuvo": {"points": 120, "subset": 100, "iterations": 2},
     "parapoint": {"points": 120, "subset": 100, "iterations": 3, "threads": 1, "device": "cpu"},
 }
 
