@@ -356,7 +356,7 @@ def metric_column(name: str, title: str = "", **given: object) -> Column:
     if name == "seconds":
         return Column("seconds", title or "time [s]", better="lower", digits=2)
     metric = METRICS[name]
-    digits = 4 if metric.unit == "radians" else 3
+    digits = {"radians": 4, "faces": 1}.get(metric.unit, 1 if metric.weighting == "count" else 3)
     column = Column(
         name,
         title or metric.label,

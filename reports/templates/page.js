@@ -70,6 +70,8 @@
   checks("metric", facts.metrics.map(({ name, title, group, definition }) =>
     ({ value: name, text: title, title: definition, heading: group, on: facts.shown.includes(name) })));
 
+  form.one.replaceChildren(...facts.metrics.map(({ title }, at) => element("option", { value: at, textContent: title })));
+
   // --- tables: heads, and rows of {text, value, mark, title, link} ---
 
   // The cells of one method (and one model) that are asked for, put together: a mean over the seeds.
@@ -140,8 +142,8 @@
   }
 
   function byModel({ methods, models, cells }) {
-    const [metric] = metrics();
-    if (!metric) { said.textContent = "Choose a metric."; return { heads: [], rows: [] }; }
+    const at = Number(form.one.value);
+    const metric = { ...facts.metrics[at], at };
     const rows = models.map((model) => {
       const entries = methods.map((method) => {
         const own = cells.filter((cell) => cell.method === method.at && cell.model === model.at);
@@ -153,7 +155,7 @@
       rank(entries, metric);
       return [{ text: model.name, link: model.page, words: true }, ...entries];
     });
-    said.textContent = `${metric.title}: ${metric.definition}. The first of the chosen metrics is shown.`;
+    said.textContent = `${metric.definition}.`;
     return { heads: [{ text: "Model", words: true }, ...methods.map(({ name, detail }) => ({ text: name, title: detail }))], rows };
   }
 
@@ -220,6 +222,9 @@
   }
 
   for (const table of document.querySelectorAll("table")) sortable(table);
+  form.addEventListener("keydown", (event) => {
+    if (event.key === "Escape") for (const open of form.querySelectorAll("details[open]")) open.open = false;
+  });
   form.addEventListener("submit", (event) => event.preventDefault());
   form.addEventListener("change", (event) => { if (event.target === form.suite) offer(); show(); });
   offer();

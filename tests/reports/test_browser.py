@@ -97,6 +97,10 @@ def test_the_leaderboard_sorts_and_filters(opened):
     assert "charts ↓" in heads.all_inner_texts()
     page.select_option("select[name=view]", "model")
     assert "timeout" in page.locator("#board tbody").inner_text()
+    before = column(page, 2)
+    page.select_option("select[name=one]", label="charts")
+    assert column(page, 2) != before
+    assert set(column(page, 2)) <= {"1.0", "skipped", ""}
 
 
 def test_a_model_s_page_is_reached_drawn_and_switched(opened, tmp_path):
