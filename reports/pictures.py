@@ -389,4 +389,4 @@ def _write_script(path: Path, content: dict[str, object]) -> None:
 
 def save(image: npt.NDArray[np.uint8], path: Path) -> None:
     """Write `image` as WebP, a quarter of a PNG: the same image gives the same bytes."""
-    Images.fromarray(image).save(path, format="WebP", quality=85, method=4)
+    Images.fromarray(image).save(path, format="WebP", quality=78, method=4)

@@ -53,13 +53,34 @@ def script(name: str, content: dict[str, object]) -> str:
     return f"received[{json.dumps(name)}]={json.dumps(content, separators=(',', ':'))};\n"
 
 
+def ordered(mesh: Mesh) -> tuple[Mesh, IntArray]:
+    """The mesh with neighbours beside each other in memory, and (F,) the old numbers of its faces.
+
+    Differences of neighbours are small and pack well: a third less than in a scrambled order.
+    """
+    low, side = mesh.vertices.min(axis=0), float(np.ptp(mesh.vertices, axis=0).max()) or 1.0
+    steps = ((mesh.vertices - low) / side * 1023).astype(np.int64)
+    code = np.zeros(len(steps), dtype=np.int64)  # along Morton's curve
+    for bit in range(10):
+        for axis in range(3):
+            code |= ((steps[:, axis] >> bit) & 1) << (3 * bit + axis)
+    vertex = np.argsort(code, kind="stable")
+    rank = np.empty_like(vertex)
+    rank[vertex] = np.arange(len(vertex))
+    faces = rank[mesh.faces]
+    face = np.lexsort((faces.max(axis=1), faces.min(axis=1)))
+    return Mesh(mesh.vertices[vertex], faces[face]), face
+
+
 def shape(mesh: Mesh, camera: Camera) -> dict[str, object]:
     """A model, and the camera that looks at it first."""
     if len(mesh.faces) > LARGEST:
         return {"large": len(mesh.faces)}
+    near, order = ordered(mesh)
     return {
-        "vertices": quantised(mesh.vertices),
-        "faces": packed(mesh.faces.astype(np.uint32)),
+        "vertices": quantised(near.vertices),
+        "faces": packed(near.faces.astype(np.uint32)),
+        "order": packed(order.astype(np.uint32)),
         "axes": camera.axes.tolist(),
         "centre": camera.centre.tolist(),
         "half": float(camera.half.max()),
@@ -107,7 +128,8 @@ def uv_map(
     """
     if len(mesh.faces) > LARGEST:
         return {"large": len(mesh.faces)}
-    rows, corners = indexed(mesh, parameterization.corners, uv)
+    mesh, order = ordered(mesh)
+    rows, corners = indexed(mesh, parameterization.corners[order], uv[order])
     drawn = Parameterization(rows, corners)
     border = drawn.edge_face_count[drawn.edge_of_halfedge] == 1
     outer = mesh.edge_face_count[mesh.edge_of_halfedge] == 1
@@ -118,8 +140,8 @@ def uv_map(
         "moved": packed(np.stack([moved, corners.reshape(-1)[moved]], axis=1).astype(np.uint32)),
         "border": packed(ends[border & outer].astype(np.uint32)),
         "seams": packed(ends[border & ~outer].astype(np.uint32)),
-        "state": packed((spanning + 2 * flipped).astype(np.uint8)),
-        **{name: packed(levels(*scale)) for name, scale in distortion.items()},
+        "state": packed((spanning + 2 * flipped).astype(np.uint8)[order]),
+        **{name: packed(levels(*scale)[order]) for name, scale in distortion.items()},
     }
 
 

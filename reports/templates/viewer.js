@@ -247,10 +247,10 @@
   async function readShape() {
     const given = await file(facts.shape);
     if (given.large) throw new Error(`${given.large.toLocaleString()} faces are too many for the viewer: pictures only.`);
-    const [vertices, faces] = await Promise.all([points(given.vertices), unpacked(given.faces)]);
+    const [vertices, faces, order] = await Promise.all([points(given.vertices), unpacked(given.faces), unpacked(given.order)]);
     const positions = gathered(vertices, 3, faces);
     shape = {
-      vertices, faces, positions, normals: cornerNormals(positions, faces, vertices.length / 3),
+      vertices, faces, order, positions, normals: cornerNormals(positions, faces, vertices.length / 3),
       centre: given.centre, half: given.half, size: given.size, axes: given.axes.flat(),
     };
     state.axes = shape.axes;
@@ -512,7 +512,7 @@
       const value = ([low, high], step) => 2 ** (low + ((high - low) * step) / facts.levels);
       const words = (step, name, limits) => step > facts.levels ? `${name} not defined`
         : `${name} ${step === facts.levels ? "≥ " : step === 0 && limits[0] < 0 ? "≤ " : ""}${value(limits, step).toFixed(2)}`;
-      this.note.textContent = face < 0 ? "" : `face ${face}: ${words(this.angle[face], "stretch", facts.limits.angle)}, `
+      this.note.textContent = face < 0 ? "" : `face ${shape.order[face]}: ${words(this.angle[face], "stretch", facts.limits.angle)}, `
         + `${words(this.area[face], "area ×", facts.limits.area)}${["", ", spans a seam", ", flipped", ", flipped"][this.kind[face]]}`;
     }
   }
