@@ -6,6 +6,8 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 from benchmarks.metrics import GROUPS, METRICS
 from reports.contents import Contents, Label
@@ -44,13 +46,10 @@ def winner(contents: Contents, case: str, metric: str) -> Winner | None:
     Equal is what is equal to three digits.
     """
     column = metric_column(metric)
-    means = contents.means
-    own = means[(means["case"] == case) & (means["ok"] > 0)]
-    own = own[~own["label"].isin(contents.atlases)]
     values = {
-        str(label): float(value)
-        for label, value in zip(own["label"], own[metric], strict=True)
-        if math.isfinite(value)
+        str(record["label"]): float(record[metric])
+        for record in _by_case(contents).get(case, ())
+        if math.isfinite(record[metric])
     }
     if not values or (metric == "bijective" and max(values.values()) < 1):
         return None
@@ -59,6 +58,17 @@ def winner(contents: Contents, case: str, metric: str) -> Winner | None:
     if metric == "bijective":
         return Winner(names, "")
     return Winner(names, column.shown(best) + (" s" if metric == "seconds" else ""))
+
+
+@cache
+def _by_case(contents: Contents) -> dict[str, list[dict[str, Any]]]:
+    """The rows of `contents.means` with a map of one chart, model by model."""
+    means = contents.means
+    rivals = means[(means["ok"] > 0) & ~means["label"].isin(contents.atlases)]
+    found: dict[str, list[dict[str, Any]]] = {}
+    for record in rivals.to_dict("records"):
+        found.setdefault(record["case"], []).append({str(k): v for k, v in record.items()})
+    return found
 
 
 @dataclass(frozen=True)
