@@ -34,6 +34,7 @@ class External:
     command: str = ""
 
     requires: ClassVar[frozenset[str]] = frozenset({"faces"})
+    deterministic: ClassVar[bool] = False  # a program makes no promise
 
     def __post_init__(self) -> None:
         for place in ("{input}", "{output}"):

@@ -10,8 +10,8 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from parapoint.errors import InputError
-from parapoint.method import UnsupportedError, is_planar_domain
-from parapoint.surface import FloatArray, IntArray, Mesh, Surface
+from parapoint.method import UnsupportedError
+from parapoint.surface import FloatArray, IntArray, Mesh, Surface, flat_faces
 
 
 class FlatteningError(RuntimeError):
@@ -42,7 +42,7 @@ def domain(surface: Surface) -> Domain:
     """
     if not isinstance(surface, Mesh):
         raise UnsupportedError("needs faces; the surface is a point cloud")
-    if not is_planar_domain(surface):
+    if not surface.is_planar_domain:
         raise UnsupportedError(f"needs a disk; the surface is {surface.topology}")
     vertices, faces, loop = surface.vertices, surface.faces, surface.boundary_loops[0]
     if not surface.referenced.all():
@@ -78,8 +78,7 @@ def check_triangles(vertices: FloatArray, faces: IntArray) -> None:
     Raises:
         InputError: names the first such face and their number.
     """
-    longest = igl.squared_edge_lengths(vertices, faces).max(axis=1)
-    flat = igl.doublearea(vertices, faces) <= 8 * np.finfo(np.float64).eps * longest
+    flat = flat_faces(vertices, faces)
     if flat.any():
         raise InputError(
             f"face {int(flat.argmax())} has no area (one of {int(flat.sum())} such faces): "

@@ -94,26 +94,33 @@ class MeshLabVoronoi:
     """MeshLab's Voronoi atlas: geodesic Voronoi cells, each mapped harmonically.
 
     The filter draws its cells from a generator that cannot be seeded: a fresh process, as each cell
-    of a run is, repeats a map, a second call in one process does not.
+    of a run is, repeats a map, a second call in one process does not. It does not end where there
+    are hardly more vertices than cells, or neighbouring faces turn differently.
 
     Attributes:
-        regions: number of cells to begin with.
+        regions: number of cells to begin with, in each component.
     """
 
     regions: int = 10
 
-    requires: ClassVar[frozenset[str]] = frozenset({"faces", "manifold"})
+    requires: ClassVar[frozenset[str]] = frozenset({"faces", "oriented", "connected"})
     packages: ClassVar[tuple[str, ...]] = ("pymeshlab",)
 
     def parameterize(self, surface: Surface, *, seed: int) -> Parameterization:  # noqa: ARG002 (the filter takes no seed)
         """The atlas in the unit square.
 
         Raises:
-            UnsupportedError: the surface is a point cloud; pymeshlab is missing.
+            UnsupportedError: the surface is a point cloud or has less than two vertices a region;
+                pymeshlab is missing.
             FlatteningError: the filter failed, or left faces out.
         """
         if not isinstance(surface, Mesh):
             raise UnsupportedError("needs faces; the surface is a point cloud")
+        if len(surface.vertices) < 2 * self.regions:
+            raise UnsupportedError(
+                f"needs at least {2 * self.regions} vertices for {self.regions} regions; "
+                f"there are {len(surface.vertices)}"
+            )
         made = filtered(
             surface.vertices,
             surface.faces,

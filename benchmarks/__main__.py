@@ -73,6 +73,13 @@ def _seeds(_: click.Context, __: click.Parameter, text: str | None) -> list[int]
 @click.option("--seeds", callback=_seeds, help="Such as 0,1,2.")
 @click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Cells at once.")
 @click.option(
+    "--executor",
+    default="local",
+    show_default=True,
+    metavar="local|dask://HOST:PORT|slurm",
+    help="Where cells run: here, or on the workers of a cluster (docs/SCALE.md).",
+)
+@click.option(
     "--timeout",
     type=click.FloatRange(0, min_open=True),
     default=1800,

@@ -15,8 +15,8 @@ from rich.table import Table
 
 from baselines import registry
 from benchmarks.metric_speed import speed_map
-from parapoint.method import prepared
 from parapoint.parameterization import Parameterization
+from parapoint.preparation import prepared
 from parapoint.surface import Mesh
 
 SIZES = (10_000, 100_000)
@@ -95,7 +95,7 @@ def overheads(sizes: tuple[int, ...] = SIZES) -> list[Overhead]:
             shortest = (float("inf"), float("inf"))
             for _ in range(3 if faces <= SIZES[0] else 1):
                 mesh = Mesh(disk.vertices, disk.faces)
-                surface, _ = prepared(mesh, method.requires)
+                (surface,) = prepared(mesh, method.requires).parts
                 begin = time.process_time()
                 made = method.parameterize(surface, seed=0)
                 middle = time.process_time()

@@ -132,6 +132,22 @@ def test_source_hash_follows_the_method_s_own_modules_and_its_libraries(monkeypa
     assert registry.source_hash(SLIM()) != hashes["slim"]
 
 
+def test_source_hash_covers_the_preparation_of_those_that_need_one(monkeypatch):
+    def hashes():
+        return [registry.source_hash(registry.method(name)[1]) for name in ("lscm", "xatlas")]
+
+    lscm, xatlas = hashes()
+    sources = registry._sources
+
+    def without_cutting(module):
+        return {name: at for name, at in sources(module).items() if name != "parapoint.cutting"}
+
+    monkeypatch.setattr(registry, "_sources", without_cutting)
+    changed, same = hashes()
+    assert changed != lscm
+    assert same == xatlas
+
+
 @pytest.mark.usefixtures("_no_plugins")
 def test_source_hash_of_a_plugin_does_not_depend_on_its_folder(tmp_path):
     made = []
