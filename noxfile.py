@@ -29,14 +29,14 @@ def lint(session: nox.Session) -> None:
 @nox.session
 def types(session: nox.Session) -> None:
     """Mypy, strict."""
-    install(session)
+    install(session, "cluster")
     session.run("mypy")
 
 
 @nox.session
 def tests(session: nox.Session) -> None:
     """The test suite: `nox -s tests -- -k cutting` runs a part of it."""
-    install(session)
+    install(session, "cluster", "uvunwrap")
     # A process a core, each with one thread: more would only wait for each other.
     session.run(
         "pytest",

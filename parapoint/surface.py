@@ -63,8 +63,8 @@ def edge_table(triangles: IntArray) -> tuple[IntArray, IntArray, IntArray]:
 def flat_faces(vertices: FloatArray, faces: IntArray) -> BoolArray:
     """(F,) which triangles have no area beyond rounding: no cotangent, gradient or normal."""
     longest = igl.squared_edge_lengths(vertices, faces).max(axis=1)
-    limit = 8 * np.finfo(np.float64).eps * longest
-    return np.asarray(igl.doublearea(vertices, faces) <= limit)
+    flat = igl.doublearea(vertices, faces) <= 8 * np.finfo(np.float64).eps * longest
+    return np.asarray(flat, dtype=bool)
 
 
 @dataclass(frozen=True, eq=False)
