@@ -44,10 +44,12 @@ class Overhead(NamedTuple):
     whole: float
 
 
-def bare_lscm(mesh: Mesh, _: Parameterization) -> None:
-    """LSCM with two opposite boundary vertices pinned."""
-    loop = mesh.boundary_loops[0]
-    igl.lscm(mesh.vertices, mesh.faces, loop[[0, len(loop) // 2]], np.array([[0.0, 0], [1, 0]]))
+def bare_lscm(mesh: Mesh, made: Parameterization) -> None:
+    """LSCM, pinned where the method pins it: the two vertices that lie on the u axis."""
+    pins = np.flatnonzero(made.uv[:, 1] == 0)
+    igl.lscm(
+        mesh.vertices, mesh.faces, pins[np.argsort(made.uv[pins, 0])], np.array([[0.0, 0], [1, 0]])
+    )
 
 
 def bare_slim(mesh: Mesh, made: Parameterization) -> None:
