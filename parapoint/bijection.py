@@ -1,11 +1,10 @@
-"""A map of a planar domain to the plane without flips or overlaps, as isometric, then as conformal
-as it gets.
+"""A map of a planar domain to the plane without flips or overlaps, nearly conformal, of even scale.
 
-Tutte's embedding is bijective; from it two energies are brought down in turn, with the space around
-the map triangulated too and kept from turning over, so that the boundary never crosses itself
-(Jiang, Schaefer and Panozzo 2017, "Simplicial complex augmentation framework for bijective maps";
-libigl has it, on J. R. Shewchuk's Triangle). The symmetric Dirichlet energy comes first: of the many
-maps that are nearly conformal the descent on the conformal energy then finds one of even scale.
+Tutte's embedding is bijective. From it energies are brought down in turn, with the space around the
+map triangulated too and kept from turning over, so that the boundary never crosses itself (Jiang,
+Schaefer and Panozzo 2017, "Simplicial complex augmentation framework for bijective maps"; libigl
+has it, on J. R. Shewchuk's Triangle). Isometric energies come first: of the many maps that are
+nearly conformal, the descent on the conformal energy then finds one of even scale.
 """
 
 from __future__ import annotations
@@ -18,10 +17,10 @@ from igl import triangle
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from parapoint.surface import FloatArray, Mesh, edge_table
+from parapoint.surface import FloatArray, IntArray, Mesh, edge_table
 
 DESCENTS = (igl.SYMMETRIC_DIRICHLET, igl.LOG_ARAP, igl.CONFORMAL)
-"""The energies in turn. libigl's first one is not a number near an isometry; the second goes on."""
+"""The energies in turn. Near an isometry libigl's first gives no numbers; the second goes on."""
 LEAST_GAIN = 0.02
 """A descent ends when a step lowers what is left of the energy by less than this share."""
 EXACT = 1e-14
@@ -29,7 +28,7 @@ EXACT = 1e-14
 MOST_STEPS = 50
 """Steps of a descent at most."""
 FLATTEST = 1e-22
-"""Least area of a triangle of the start, in that of the unit disk: beyond it numbers decide."""
+"""Least area of a face, of the surface or the disk of radius 1: below it rounding decides."""
 
 
 class BijectionError(RuntimeError):
@@ -40,23 +39,30 @@ def bijective_map(mesh: Mesh) -> FloatArray:
     """(V, 2) a bijective map of a connected planar domain, faces counter-clockwise.
 
     Raises:
-        BijectionError: a triangle is too thin, or too small in Tutte's embedding, for numbers.
+        BijectionError: a face is flat, or in Tutte's embedding too small for numbers.
     """
     size = np.sqrt(mesh.face_areas.sum())
     mesh = Mesh(mesh.vertices / size, mesh.faces)
+    if not mesh.face_areas.min() > FLATTEST:
+        raise BijectionError("a face has no area")
     uv = tutte(mesh)
     areas = signed_areas(uv, mesh.faces)
     if not (np.isfinite(uv).all() and areas.min() > FLATTEST):
         raise BijectionError("its embedding in the disk has flat triangles")
-    uv /= np.sqrt(areas.sum())
+    start = uv = uv / np.sqrt(areas.sum())
     for energy in DESCENTS:
         uv = _descended(mesh, uv, energy)
+    if uv is start:
+        raise BijectionError("no step lowers its distortion")
     return np.asarray(size * uv)
 
 
 def tutte(mesh: Mesh) -> FloatArray:
-    """(V, 2) the longest loop on the unit circle, all other vertices at the mean of their
-    neighbours; each inner loop is filled with a fan around a vertex of its own."""
+    """(V, 2) Tutte's embedding in the unit disk, the longest loop on the circle.
+
+    All other vertices are at the mean of their neighbours; each inner loop is filled with a fan
+    around a vertex of its own.
+    """
     outer, *inner = mesh.boundary_loops
     fans = [
         np.stack([np.roll(loop, -1), loop, np.full(len(loop), len(mesh.vertices) + row)], axis=1)
@@ -80,7 +86,7 @@ def factored(matrix: sparse.csc_matrix) -> Any:
     return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
 
 
-def signed_areas(uv: FloatArray, faces: np.typing.NDArray[np.int64]) -> FloatArray:
+def signed_areas(uv: FloatArray, faces: IntArray) -> FloatArray:
     """(F,) signed areas of triangles in the plane."""
     a, b = uv[faces[:, 1]] - uv[faces[:, 0]], uv[faces[:, 2]] - uv[faces[:, 0]]
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
@@ -114,8 +120,11 @@ def _descended(mesh: Mesh, uv: FloatArray, energy: igl.MappingEnergyType) -> Flo
 def _excess(mesh: Mesh, uv: FloatArray, energy: igl.MappingEnergyType) -> float:
     """The mean of an energy over the area, above its least value, in units of this."""
     faces = mesh.faces
-    edges = [np.linalg.norm(of[faces[:, i]] - of[faces[:, j]], axis=1)
-             for i, j in ((1, 2), (2, 0), (0, 1)) for of in (mesh.vertices, uv)]
+    edges = [
+        np.linalg.norm(of[faces[:, i]] - of[faces[:, j]], axis=1)
+        for i, j in ((1, 2), (2, 0), (0, 1))
+        for of in (mesh.vertices, uv)
+    ]
     area, image = mesh.face_areas, np.abs(signed_areas(uv, faces))
     a, a_uv, b, b_uv, c, c_uv = (edge**2 for edge in edges)
     # σ1² + σ2² of the map that takes a triangle of sides a, b, c to one of other sides.

@@ -1,8 +1,8 @@
 """A nearly conformal map of a bare cloud with short seams, computed: the `fast` preset starts here.
 
-The cloud is triangulated, cut, and flattened by two linear solves: one for the scale of the map,
-one for the map of that scale. The cuts lead to where the scale is most extreme (as in Sawhney and
-Crane 2017, "Boundary first flattening", section 6), and are as long as an even scale needs.
+The cloud is triangulated, cut, and flattened by a bijective map. The cuts lead to where the scale
+of a conformal map, found by a linear solve, is most extreme (as in Sawhney and Crane 2017,
+"Boundary first flattening", section 6), and are as long as an even scale needs.
 """
 
 from __future__ import annotations

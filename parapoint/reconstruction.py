@@ -270,9 +270,9 @@ def _single_fans(faces: IntArray) -> IntArray:
 def _filled(
     points: FloatArray, faces: IntArray, loops: list[IntArray], spacing: FloatArray
 ) -> IntArray:
-    """The faces with the boundary loops that are short or narrow closed by ears, the shortest first.
+    """The faces with each short or narrow boundary loop closed by ears, the shortest first.
 
-    A loop that no ears can close stays open.
+    A loop that ears cannot close stays open.
     """
     present = {tuple(edge) for edge in edge_table(faces)[0].tolist()}
     normals = igl.per_vertex_normals(points, faces)

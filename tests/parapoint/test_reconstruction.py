@@ -77,9 +77,7 @@ def test_a_long_hole_is_filled_if_it_is_narrow(width: int, loops: int) -> None:
     x, y = np.meshgrid(np.arange(16.0), np.arange(12.0))
     points = np.column_stack([x.ravel(), y.ravel(), 0 * x.ravel()])
     corner = (np.arange(11)[:, None] * 16 + np.arange(15)).ravel()
-    faces = np.concatenate(
-        [corner[:, None] + np.array(side) for side in ([0, 1, 17], [0, 17, 16])]
-    )
+    faces = np.concatenate([corner[:, None] + np.array(side) for side in ([0, 1, 17], [0, 17, 16])])
     middle = points[faces].mean(axis=1)
     hole = (np.abs(middle[:, 0] - 7.5) < 4) & (middle[:, 1] > 2) & (middle[:, 1] < 2 + width)
     mesh = Mesh(points, faces[~hole])
