@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import heapq
 
-import igl
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
@@ -31,9 +30,7 @@ SHARPEST = -0.8
 GLUE = 0.3
 """Least cosine between a triangle's normal and that of a vertex where the front meets itself."""
 LONGEST_HOLE = 12
-"""Edges of the largest hole that is filled, however wide."""
-WIDEST_CRACK = 3.0
-"""Longest edge across a hole with more edges that is filled, in spacings."""
+"""Edges of the largest hole that is filled."""
 HANDLE = 30
 """A handle counts as so many boundary edges or unused points where two fronts are compared."""
 
@@ -56,8 +53,7 @@ def triangulation(points: FloatArray) -> Mesh:
     if not near.any():
         raise ReconstructionError("no two neighbouring points span a triangle with a third")
     fronts = [_Front(points, triangles[near], radius[near], cost) for cost in BEND_COSTS]
-    parts = (_largest_part(points, front.grown(), spacing) for front in fronts)
-    return min(parts, key=_defects)
+    return min((_largest_part(points, front.grown()) for front in fronts), key=_defects)
 
 
 def delaunay_triangles(points: FloatArray, spacing: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -227,11 +223,11 @@ def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _largest_part(points: FloatArray, faces: IntArray, spacing: FloatArray) -> Mesh:
-    """The largest component of oriented faces as a manifold, its small holes and cracks filled."""
+def _largest_part(points: FloatArray, faces: IntArray) -> Mesh:
+    """The largest component of oriented faces as a manifold, its small holes filled."""
     faces = _connected(points, _single_fans(faces))
-    loops = Mesh(points, faces).boundary_loops
-    return Mesh(points, _connected(points, _single_fans(_filled(points, faces, loops, spacing))))
+    loops = [loop for loop in Mesh(points, faces).boundary_loops if len(loop) <= LONGEST_HOLE]
+    return Mesh(points, _connected(points, _single_fans(_filled(points, faces, loops))))
 
 
 def _connected(points: FloatArray, faces: IntArray) -> IntArray:
@@ -267,38 +263,25 @@ def _single_fans(faces: IntArray) -> IntArray:
         faces = faces[good]
 
 
-def _filled(
-    points: FloatArray, faces: IntArray, loops: list[IntArray], spacing: FloatArray
-) -> IntArray:
-    """The faces with each short or narrow boundary loop closed by ears, the shortest first.
-
-    A loop that ears cannot close stays open.
-    """
+def _filled(points: FloatArray, faces: IntArray, loops: list[IntArray]) -> IntArray:
+    """The faces with each boundary loop closed by ears, the shortest first."""
     present = {tuple(edge) for edge in edge_table(faces)[0].tolist()}
-    normals = igl.per_vertex_normals(points, faces)
-    filled = [faces]
+    ears: list[list[int]] = []
     for boundary in loops:
         loop: list[int] = boundary[::-1].tolist()  # against the faces, as the ears will run
-        is_crack = len(loop) > LONGEST_HOLE
-        ears: list[list[int]] = []
         while len(loop) > 3:
             before, after = np.roll(loop, 1), np.roll(loop, -1)
             length = np.linalg.norm(points[after] - points[before], axis=1)
             ends = np.sort(np.stack([before, after], axis=1), axis=1).tolist()
             length[[tuple(pair) in present for pair in ends]] = np.inf
-            if is_crack:  # not a narrow strip, whose back ears would cover
-                ears_normals = np.cross(points[loop] - points[before], points[after] - points[loop])
-                too_wide = length > WIDEST_CRACK * np.maximum(spacing[before], spacing[after])
-                is_back = (ears_normals * normals[loop]).sum(axis=1) <= 0
-                length[too_wide | is_back] = np.inf
             ear = int(length.argmin())
             if not np.isfinite(length[ear]):
                 break
             present.add(tuple(ends[ear]))
             ears.append([int(before[ear]), loop.pop(ear), int(after[ear])])
         if len(loop) == 3:
-            filled.append(np.array([*ears, loop], dtype=np.int64))
-    return np.concatenate(filled)
+            ears.append(loop)
+    return np.concatenate([faces, np.array(ears, dtype=np.int64).reshape(-1, 3)])
 
 
 def _defects(mesh: Mesh) -> int:
