@@ -111,14 +111,15 @@ the paper in this:
 - The map is computed on the bare cloud (`parapoint.reconstruction`, `parapoint.flattening`) in
   place of the warm-up on the hull and the training. Mean angle distortion over all faces, radians:
   beetle 0.009 (best published figure 0.037), camelhead 0.030 (0.088), hand 0.094 (0.145),
-  nefertiti 0.042 (0.117), max planck 0.069 (0.117), fertility 0.091 (0.166), in 5 to 20 seconds of
-  one core.
-- It is bijective on the triangulation (`parapoint.bijection`), where it was two linear solves
-  before. Of the area off the seam, nefertiti overlaps itself by 0.65 % (18 % before), fertility by
-  0.03 % (7 %); the area discrepancy fell from 0.81 to 0.59 and from 0.55 to 0.39.
+  nefertiti 0.052 (0.117; the worst of three seeds), max planck 0.069 (0.117), fertility 0.091
+  (0.166), in 5 to 25 seconds of one core. The settings were chosen on these models among others.
+- The map is bijective on the triangulation (`parapoint.bijection`). Against two linear solves, off
+  the faces that span the seam, nefertiti overlaps itself by 0.6 % of its area in place of 18 %,
+  fertility by 0.03 % in place of 7 %; the area discrepancy is 0.59 in place of 0.81, and 0.39 in
+  place of 0.55.
 - It fails where the surface crosses itself, which a bare cloud does not show: 984 faces of
   mannequin-devil and 292 of keenan-ogre do. The triangulation then has handles, or parts turned
-  inside out; 6 % of the faces of the one come out flipped (0.7 % of the other's).
+  inside out: 6 % and 0.7 % of their faces come out flipped, and 6 % of the ogre's area overlaps.
 - Cut and Stitch are layers of local features that blend affine maps at anchors
   (`parapoint.anchored`); Unwrap and Wrap drop and add a coordinate. The anchors are the fitted
   points: a map is kept exactly at these and interpolated between. Of nefertiti's 35,000 vertices
