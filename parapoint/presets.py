@@ -117,9 +117,10 @@ the paper in this:
   the faces that span the seam, nefertiti overlaps itself by 0.6 % of its area in place of 18 %,
   fertility by 0.03 % in place of 7 %; the area discrepancy is 0.59 in place of 0.81, and 0.39 in
   place of 0.55.
-- It fails where the surface crosses itself, which a bare cloud does not show: 984 faces of
-  mannequin-devil and 292 of keenan-ogre do. The triangulation then has handles, or parts turned
-  inside out: 6 % and 0.7 % of their faces come out flipped, and 6 % of the ogre's area overlaps.
+- It fails where the triangulation does, which then has handles or parts turned inside out: at thin
+  parts that are coarsely sampled (gargoyle, on which nothing was chosen: 24 handles, 26 % of the
+  faces flipped), and in models that cross themselves (mannequin-devil: 6 % flipped; keenan-ogre:
+  0.7 %, and 6 % of the area overlaps).
 - Cut and Stitch are layers of local features that blend affine maps at anchors
   (`parapoint.anchored`); Unwrap and Wrap drop and add a coordinate. The anchors are the fitted
   points: a map is kept exactly at these and interpolated between. Of nefertiti's 35,000 vertices
