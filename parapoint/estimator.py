@@ -44,7 +44,7 @@ FEWEST_VERTICES = 2_000
 BATCH = {"cpu": 2_048, "cuda": 65_536}
 """Points mapped at a time: on a CPU the layers of so many stay in its cache."""
 COMPUTED_PER_SECOND = 400
-"""Points of a computed map for each second of the budget: it takes what it takes, at about 2,000
+"""Points of a computed map for each second of the budget: it takes what it takes, at about 1,000
 points a second on one core, so a small budget gets fewer points."""
 COINCIDENT = 1e-6
 """Points of a computed map that agree to this, in radii of the cloud, count as one."""
