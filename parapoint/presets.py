@@ -110,17 +110,20 @@ the paper in this:
 
 - The map is computed on the bare cloud (`parapoint.reconstruction`, `parapoint.flattening`) in
   place of the warm-up on the hull and the training. Mean angle distortion over all faces, radians:
-  beetle 0.009 (best published figure 0.037), camelhead 0.030 (0.088), hand 0.094 (0.145),
-  nefertiti 0.052 (0.117; the worst of three seeds), max planck 0.069 (0.117), fertility 0.091
+  beetle 0.009 (best published figure 0.037), camelhead 0.030 (0.088), hand 0.096 (0.145),
+  nefertiti 0.034 (0.117; the worst of three seeds), max planck 0.049 (0.117), fertility 0.088
   (0.166), in 5 to 25 seconds of one core. The settings were chosen on these models among others.
-- The map is bijective on the triangulation (`parapoint.bijection`). Against two linear solves, off
-  the faces that span the seam, nefertiti overlaps itself by 0.6 % of its area in place of 18 %,
-  fertility by 0.03 % in place of 7 %; the area discrepancy is 0.59 in place of 0.81, and 0.39 in
-  place of 0.55.
-- It fails where the triangulation does, which then has handles or parts turned inside out: at thin
-  parts that are coarsely sampled (gargoyle, on which nothing was chosen: 24 handles, 26 % of the
-  faces flipped), and in models that cross themselves (mannequin-devil: 6 % flipped; keenan-ogre:
-  0.7 %, and 6 % of the area overlaps).
+- The map is bijective on the triangulation (`parapoint.bijection`). Against two linear solves, with
+  fronts alone and off the faces that span the seam, nefertiti overlaps itself by 0.6 % of its area
+  in place of 18 %, fertility by 0.03 % in place of 7 %; the area discrepancy is 0.59 in place of
+  0.81, and 0.39 in place of 0.55.
+- The triangulation is the best of two fronts and of one between inside and outside
+  (`parapoint.delaunay`), which tells apart the sheets of thin parts. Gargoyle, on which it was
+  developed, has no handle in place of 24, and 0.10 % of its faces flipped in place of 26 %;
+  nefertiti has 0.02 to 0.05 % in place of 0.19 to 0.42 % on three seeds.
+- It fails where the triangulation does, in models that cross themselves: of mannequin-devil 2.2 %
+  of the faces are flipped (6.2 % by fronts alone); of keenan-ogre 0.7 %, and 6 % of the area
+  overlaps.
 - Cut and Stitch are layers of local features that blend affine maps at anchors
   (`parapoint.anchored`); Unwrap and Wrap drop and add a coordinate. The anchors are the fitted
   points: a map is kept exactly at these and interpolated between. Of nefertiti's 35,000 vertices

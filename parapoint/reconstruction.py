@@ -4,6 +4,10 @@ After Cohen-Steiner and Da 2004 ("A greedy Delaunay-based surface reconstruction
 triangles of the 3D Delaunay complex those with small empty balls are candidates, and a front takes
 them one by one, the smoothest and smallest first. It only closes up on itself once nothing else is
 left to take, which keeps noise from growing handles.
+
+Where two sheets are nearer to each other than their points are, no front tells them apart. One more
+front therefore takes only the triangles between inside and outside (`parapoint.delaunay`), as they
+face; of all the one with the fewest defects is kept. Open sheets have no inside.
 """
 
 from __future__ import annotations
@@ -13,14 +17,13 @@ import heapq
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
-from scipy.spatial import Delaunay, QhullError, cKDTree
+from scipy.spatial import QhullError, cKDTree
 
+from parapoint.delaunay import delaunay_complex, empty_radii, insideness
 from parapoint.surface import FloatArray, IntArray, Mesh, edge_table
 
 Vector = tuple[float, float, float]
 
-JOGGLE = 1e-4
-"""Noise on the points that the Delaunay complex sees, in spacings: it breaks ties."""
 LOOSEST = 2.5
 """Largest empty ball of a candidate triangle, in spacings."""
 BEND_COSTS = (15.0, 2.0)
@@ -32,7 +35,7 @@ GLUE = 0.3
 LONGEST_HOLE = 12
 """Edges of the largest hole that is filled."""
 HANDLE = 30
-"""A handle counts as so many boundary edges or unused points where two fronts are compared."""
+"""A handle counts as so many boundary edges, folds or unused points where fronts are compared."""
 
 
 class ReconstructionError(RuntimeError):
@@ -48,84 +51,43 @@ def triangulation(points: FloatArray) -> Mesh:
         ReconstructionError: there are no candidate triangles.
     """
     spacing = cKDTree(points).query(points, 7)[0][:, 1:].mean(axis=1)
-    triangles, radius = delaunay_triangles(points, spacing)
+    try:
+        delaunay = delaunay_complex(points, spacing)
+    except QhullError as error:
+        raise ReconstructionError(f"Qhull: {str(error).splitlines()[0]}") from None
+    triangles, radius = delaunay.triangles, empty_radii(delaunay)
     near = radius < LOOSEST * spacing[triangles].max(axis=1)
     if not near.any():
         raise ReconstructionError("no two neighbouring points span a triangle with a third")
+    front, back = (insideness(delaunay) > 0)[delaunay.sides].T
+    between = near & (front != back)
+    outward = np.where(front[:, None], triangles[:, ::-1], triangles)
     fronts = [_Front(points, triangles[near], radius[near], cost) for cost in BEND_COSTS]
+    if between.any():
+        args = points, outward[between], radius[between], BEND_COSTS[-1]
+        fronts.append(_Front(*args, is_oriented=True))
     return min((_largest_part(points, front.grown()) for front in fronts), key=_defects)
-
-
-def delaunay_triangles(points: FloatArray, spacing: FloatArray) -> tuple[IntArray, FloatArray]:
-    """The triangles (T, 3) of the Delaunay complex of points (N, 3), and their radii (T,).
-
-    A radius is that of the smallest ball through the corners with no point inside. Far corners of
-    a box keep a plane three-dimensional.
-
-    Raises:
-        ReconstructionError: Qhull gives up.
-    """
-    rng = np.random.default_rng(0)
-    centre, reach = (points.max(axis=0) + points.min(axis=0)) / 2, np.ptp(points, axis=0).max()
-    corner_signs = 2 * np.indices((2, 2, 2)).reshape(3, -1).T - 1
-    box = 3 * reach * (corner_signs + rng.uniform(-0.1, 0.1, (8, 3)))
-    noise = JOGGLE * spacing[:, None] * rng.standard_normal(points.shape)
-    sites = np.concatenate([points + noise - centre, box])
-    try:
-        complex_ = Delaunay(sites)
-    except QhullError as error:
-        raise ReconstructionError(f"Qhull: {str(error).splitlines()[0]}") from None
-    tetrahedra, centres = complex_.simplices, _circumcentres(sites[complex_.simplices])
-    rows, one, two = [], [], []
-    for opposite in range(4):
-        other = complex_.neighbors[:, opposite]
-        once = other > np.arange(len(tetrahedra))  # -1 outside the box
-        rows.append(np.delete(tetrahedra[once], opposite, axis=1))
-        one.append(centres[once])
-        two.append(centres[other[once]])
-    triangles = np.sort(np.concatenate(rows), axis=1).astype(np.int64)
-    inside = (triangles < len(points)).all(axis=1)
-    triangles = triangles[inside]
-    ends = np.concatenate(one)[inside], np.concatenate(two)[inside]
-    return triangles, _empty_radii(sites[triangles], *ends)
-
-
-def _circumcentres(corners: FloatArray) -> FloatArray:
-    """(T, 3) centres of the balls through the corners (T, 4, 3) of tetrahedra."""
-    a, b, c = (corners[:, k] - corners[:, 0] for k in (1, 2, 3))
-    half = [(edge**2).sum(axis=1, keepdims=True) / 2 for edge in (a, b, c)]
-    dual = half[0] * np.cross(b, c) + half[1] * np.cross(c, a) + half[2] * np.cross(a, b)
-    volume = (a * np.cross(b, c)).sum(axis=1, keepdims=True)
-    return np.asarray(corners[:, 0] + dual / np.where(volume == 0, 1e-300, volume))
-
-
-def _empty_radii(corners: FloatArray, one: FloatArray, two: FloatArray) -> FloatArray:
-    """(T,) radii of the smallest empty balls through the corners (T, 3, 3) of triangles.
-
-    Their centres lie on the dual edges between `one` and `two` (T, 3): at the circumcentre if the
-    edge crosses the triangle's plane, else at the nearer end.
-    """
-    a, b, c = (corners[:, k] for k in range(3))
-    normal = np.cross(b - a, c - a)
-    sides = np.prod([np.linalg.norm(p - q, axis=1) for p, q in ((a, b), (b, c), (c, a))], axis=0)
-    circumradius = sides / np.maximum(2 * np.linalg.norm(normal, axis=1), 1e-300)
-    heights = [((end - a) * normal).sum(axis=1) for end in (one, two)]
-    crosses = np.sign(heights[0]) * np.sign(heights[1]) <= 0
-    nearer = np.minimum(np.linalg.norm(one - a, axis=1), np.linalg.norm(two - a, axis=1))
-    return np.asarray(np.where(crosses, circumradius, nearer))
 
 
 class _Front:
     """Oriented triangles grown from seeds, over candidate triangles (T, 3) with radii (T,).
+
+    With `is_oriented` a candidate is only taken with its corners in their order.
 
     A directed edge from i to j is the integer i · N + j; plain Python numbers, as it goes one
     triangle at a time.
     """
 
     def __init__(
-        self, points: FloatArray, triangles: IntArray, radius: FloatArray, bend_cost: float
+        self,
+        points: FloatArray,
+        triangles: IntArray,
+        radius: FloatArray,
+        bend_cost: float,
+        *,
+        is_oriented: bool = False,
     ) -> None:
-        self.size, self.bend_cost = len(points), bend_cost
+        self.size, self.bend_cost, self.is_oriented = len(points), bend_cost, is_oriented
         a, b, c = (points[triangles[:, k]] for k in range(3))
         normals = np.cross(b - a, c - a)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
@@ -135,8 +97,8 @@ class _Front:
         self.normals: list[Vector] = [(x, y, z) for x, y, z in normals.tolist()]
         self.candidates: dict[int, list[int]] = {}
         for row, (i, j, k) in enumerate(self.corners):
-            for key in (i * self.size + j, j * self.size + k, i * self.size + k):
-                self.candidates.setdefault(key, []).append(row)
+            for p, q in ((i, j), (j, k), (k, i)):
+                self.candidates.setdefault(min(p, q) * self.size + max(p, q), []).append(row)
         self.open: dict[int, Vector] = {}  # edge of the front: normal of the triangle on its left
         self.closed: set[int] = set()  # edges with both triangles, in either direction
         self.leaving = [0] * self.size  # edges of the front that start at a vertex
@@ -206,7 +168,10 @@ class _Front:
             for other in self.candidates[min(i, j) * self.size + max(i, j)]:
                 if self.taken[other]:
                     continue
-                cosine = _dot(self._oriented_normal(other, j, i), normal)
+                beside = self._oriented_normal(other, j, i)
+                if self.is_oriented and beside != self.normals[other]:
+                    continue
+                cosine = _dot(beside, normal)
                 if cosine > SHARPEST:
                     cost = self.radii[other] * (1 + self.bend_cost * (1 - cosine))
                     third = sum(self.corners[other]) - i - j
@@ -285,6 +250,16 @@ def _filled(points: FloatArray, faces: IntArray, loops: list[IntArray]) -> IntAr
 
 
 def _defects(mesh: Mesh) -> int:
-    """What a triangulation has of handles, boundary edges and unused points."""
+    """What a triangulation has of handles, boundary edges, folds and unused points."""
     boundary = int((mesh.edge_face_count == 1).sum())
-    return HANDLE * mesh.genus + boundary + int((~mesh.referenced).sum())
+    return HANDLE * mesh.genus + boundary + _folds(mesh) + int((~mesh.referenced).sum())
+
+
+def _folds(mesh: Mesh) -> int:
+    """The number of edges at which the surface turns by more than a right angle."""
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    order = np.argsort(mesh.edge_of_halfedge, kind="stable")
+    twin = np.diff(mesh.edge_of_halfedge[order]) == 0
+    one, two = order[:-1][twin] // 3, order[1:][twin] // 3
+    return int(((normals[one] * normals[two]).sum(axis=1) < 0).sum())

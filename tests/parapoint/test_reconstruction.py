@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from parapoint.reconstruction import _filled, _single_fans, delaunay_triangles, triangulation
+from parapoint.reconstruction import _filled, _Front, _single_fans, triangulation
 from parapoint.surface import Mesh
 
 
@@ -44,17 +44,24 @@ def test_of_two_surfaces_the_larger_is_followed() -> None:
     assert np.array_equal(np.flatnonzero(mesh.referenced), np.arange(300, 900))
 
 
-def test_empty_balls_are_empty_and_smallest() -> None:
-    points = np.random.default_rng(0).normal(size=(60, 3))
-    triangles, radius = delaunay_triangles(points, np.zeros(60))
-    a, b, c = (points[triangles[:, k]] for k in range(3))
-    sides = [np.linalg.norm(p - q, axis=1) for p, q in ((a, b), (b, c), (c, a))]
-    circumradius = np.prod(sides, axis=0) / (2 * np.linalg.norm(np.cross(b - a, c - a), axis=1))
-    assert (radius >= circumradius * (1 - 1e-9)).all()
-    # The shortest edges are Delaunay, so the pair of nearest points is in a triangle.
-    apart = np.linalg.norm(points[:, None] - points, axis=2) + 9 * np.eye(60)
-    pair = set(np.unravel_index(apart.argmin(), apart.shape))
-    assert any(pair <= set(row) for row in triangles.tolist())
+def test_a_sheet_near_another_is_kept_apart_by_its_inside() -> None:
+    """A lens a third as thick as its points are apart: fronts alone grow 8 handles and holes."""
+    mesh = triangulation(sphere() * [1, 1, 0.05])
+    assert mesh.topology == "sphere"
+    assert mesh.referenced.mean() > 0.98
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    area = np.cross(b - a, c - a)[:, 2] / 2
+    assert area[area > 0].sum() == pytest.approx(np.pi, rel=0.03)  # each sheet covers the lens once
+    assert area[area < 0].sum() == pytest.approx(-np.pi, rel=0.03)
+
+
+def test_an_oriented_front_takes_triangles_as_they_are() -> None:
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
+    same, opposed = np.array([[0, 1, 2], [1, 3, 2]]), np.array([[0, 1, 2], [1, 2, 3]])
+    for triangles, faces in ((same, 2), (opposed, 1)):
+        front = _Front(points, triangles, np.array([0.7, 0.8]), 2.0, is_oriented=True)
+        assert len(front.grown()) == faces
+    assert len(_Front(points, opposed, np.array([0.7, 0.8]), 2.0).grown()) == 2
 
 
 def test_the_largest_fan_stays_at_a_vertex() -> None:
