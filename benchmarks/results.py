@@ -58,6 +58,8 @@ IDENTITY_COLUMNS = ("suite", "case", "method", "params", "seed", "status")
 _NAME = re.compile(r"[0-9a-f]{8,64}")
 SOURCE_CHANGED = "the source of the method changed during the run; run again"
 """Reason of a row that the next run does anew whatever its hash says."""
+MISSING = "not installed: "
+"""Begins the reason of a row that lacked a package or program: the next run tries it again."""
 _DAMAGE = (
     *(OSError, EOFError, ValueError, TypeError, AttributeError, KeyError, MemoryError),
     *(NotImplementedError, zipfile.BadZipFile, zlib.error),

@@ -19,7 +19,7 @@ from baselines import registry
 from benchmarks import environment, executors, models
 from benchmarks.builtin import BUILTIN
 from benchmarks.executors import WORKER_LOST, Executor, Task
-from benchmarks.results import SOURCE_CHANGED, ResultRow, Store, identity, plain
+from benchmarks.results import MISSING, SOURCE_CHANGED, ResultRow, Store, identity, plain
 from benchmarks.suites import Suite
 from parapoint import files
 from parapoint.errors import InputError
@@ -406,6 +406,8 @@ def _changed(
     there = runs[row.run] if 0 <= row.run < len(runs) else {}
     if any(there.get(name) != here[name] for name in environment.MACHINE):
         return f"{row.status} in another environment"
+    if row.reason.startswith(MISSING):
+        return "may be installed now"
     limit = {"timeout": "time_limit", "out_of_memory": "memory_limit"}.get(row.status)
     if limit and here[limit] > there.get(limit, 0) * 1.01:  # the machine's own total may vary
         return "limit raised"

@@ -327,6 +327,36 @@ def test_a_timeout_runs_again_only_under_a_higher_limit(tmp_path):
     assert statuses == [["timeout"], [], ["ok"]]
 
 
+def test_what_was_not_installed_is_tried_again_and_loaded_before_the_clock(tmp_path):
+    file = tmp_path / "plugin.py"
+    file.write_text(f"""{METHOD}
+from parapoint.method import MissingError
+
+@dataclass(frozen=True)
+class Guest:
+    requires: ClassVar[frozenset[str]] = FACES
+
+    def load(self):
+        if not Path({str(tmp_path / "installed")!r}).exists():
+            raise MissingError("needs the package guest")
+        time.sleep(0.3)
+
+    def parameterize(self, surface, *, seed):
+        return flat(surface)
+""")
+    found = []
+    for _ in range(3):
+        done = run(suite(), tmp_path / "out", plugins=[f"{file}:Guest"], methods=["guest"])
+        found.append((dict(done.reasons), [(row.status, row.reason) for row in done.ran]))
+        (tmp_path / "installed").touch()
+    assert found == [
+        ({"new": 1}, [("skipped", "not installed: needs the package guest")]),
+        ({"may be installed now": 1}, [("ok", "")]),
+        ({}, []),
+    ]
+    assert Store(tmp_path / "out").rows()[0].seconds < 0.3
+
+
 @pytest.mark.usefixtures("in_process")
 def test_a_missing_model_is_a_skipped_row_and_the_rest_runs(tmp_path, monkeypatch):
     load = models.load
