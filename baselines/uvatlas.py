@@ -50,6 +50,7 @@ class UVAtlas:
 
     requires: ClassVar[frozenset[str]] = frozenset({"faces", "manifold"})
     packages: ClassVar[tuple[str, ...]] = ("open3d",)
+    deterministic: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         if not 0 <= self.max_stretch <= 1:

@@ -481,7 +481,9 @@ def test_every_method_gives_the_same_map_in_two_cells_or_says_that_it_does_not(
     for name in promised:
         first, second = rows[0][name], rows[1][name]
         assert (first.status, first.uv_sha256) == (second.status, second.uv_sha256), name
-    assert not registry.method("parapoint(time_budget=9, device=cpu)")[1].deterministic
+    for spec in ("parapoint(time_budget=9, device=cpu)", "nuvo(time_budget=9)", "uvatlas"):
+        assert not registry.method(spec)[1].deterministic
+    assert registry.method("parapoint(device=cpu)")[1].deterministic
     assert not registry.method("external(command='{input} {output}')")[1].deterministic
 
 
