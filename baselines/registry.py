@@ -36,6 +36,7 @@ METHODS: dict[str, str] = {
     "meshlab_harmonic": "baselines.meshlab:MeshLabHarmonic",
     "meshlab_voronoi": "baselines.meshlab:MeshLabVoronoi",
     "meshlab_triangles": "baselines.meshlab:MeshLabTriangles",
+    "meshed": "baselines.meshed:Meshed",
     "external": "baselines.external:External",
     "parapoint": "parapoint.estimator:ParaPoint",
 }

@@ -75,6 +75,9 @@ REQUIREMENTS: dict[str, Callable[[Surface], str | None]] = {
     "disk_after_cut": _topology_unless(
         is_cuttable, "a connected, manifold, consistently oriented mesh (others have no disk cut)"
     ),
+    "points": lambda surface: (
+        "takes a point cloud; the surface is a mesh" if isinstance(surface, Mesh) else None
+    ),
     "cuda": _cuda_missing,
 }
 """Each word of `Method.requires`: the reason why a surface does not meet it, or None.
