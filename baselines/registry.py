@@ -36,6 +36,8 @@ METHODS: dict[str, str] = {
     "meshlab_harmonic": "baselines.meshlab:MeshLabHarmonic",
     "meshlab_voronoi": "baselines.meshlab:MeshLabVoronoi",
     "meshlab_triangles": "baselines.meshlab:MeshLabTriangles",
+    "parapoint+slim": "baselines.hybrid:ParaPointSLIM",
+    "artist+slim": "baselines.hybrid:ArtistSLIM",
     "meshed": "baselines.meshed:Meshed",
     "external": "baselines.external:External",
     "parapoint": "parapoint.estimator:ParaPoint",
@@ -147,12 +149,14 @@ def source_hash(made: Method) -> str:
     """Hash of what determines a method's results beside its parameters, the same on any machine.
 
     It covers the source of the method's module and of the modules of the same package that this
-    one imports, directly or not, and the versions of the packages that the class names in
-    `packages`. For ParaPoint it is thus the whole of `parapoint` that it uses.
+    one imports, directly or not, the same of the modules that the class names in `builds_on`, and
+    the versions of the packages that it names in `packages`. For ParaPoint it is thus the whole of
+    `parapoint` that it uses.
     """
-    module = sys.modules[type(made).__module__]
+    modules = [type(made).__module__, *getattr(made, "builds_on", ())]
+    sources = {k: v for module in modules for k, v in _sources(sys.modules[module]).items()}
     digest = hashlib.sha256()
-    for name, path in sorted(_sources(module).items()):
+    for name, path in sorted(sources.items()):
         text = path.read_text(encoding="utf-8").replace("\r\n", "\n")
         # A plugin file's module name holds its path, which is no part of its identity.
         digest.update(f"{name if '.' in name else path.name}\n{text}\n".encode())

@@ -561,7 +561,8 @@ class Store:
         if not row.uv_sha256:
             return {}
         try:
-            return measured(self.surface(row), self.result(row), self.reference(row))
+            surface = read_surface(self.scored_path(row.surface_hash))
+            return measured(surface, self.result(row), self.reference(row))
         except InputError as error:
             _log.warning("%s, %s: no metrics: %s", row.case, row.method, error)
             return {}
@@ -573,6 +574,15 @@ class Store:
     def reference_path(self, surface_hash: str) -> Path:
         """Where the map lies that the surface of that hash came with."""
         return self.folder / "references" / f"{surface_hash}.npz"
+
+    def exact_path(self, surface_hash: str) -> Path:
+        """Where the points without noise lie of the cloud of that hash."""
+        return self.folder / "exact" / f"{surface_hash}.npz"
+
+    def scored_path(self, surface_hash: str) -> Path:
+        """Where the surface lies on which a map is scored: the points without noise, if stored."""
+        exact = self.exact_path(surface_hash)
+        return exact if exact.exists() else self.surface_path(surface_hash)
 
     def uv_path(self, row_id: str) -> Path:
         """Where the map of that row lies."""
@@ -671,6 +681,13 @@ class Store:
         with disk_said(path):
             if not path.exists():
                 write_arrays(path, map_arrays(reference))
+
+    def add_exact(self, surface_hash: str, cloud: PointCloud) -> None:
+        """Store the points without noise of a cloud, unless they are there."""
+        path = self.exact_path(surface_hash)
+        with disk_said(path):
+            if not path.exists():
+                write_arrays(path, surface_arrays(cloud))
 
     def surface_hashes(self) -> dict[str, str]:
         """Hashes of surfaces in the store by what they were read from, as `note_surfaces` says."""

@@ -232,15 +232,20 @@ def _measure(store: Store, pool: _Pool, summary: Summary, progress: Progress) ->
 
     tasks = []
     for row in rows:
-        reference = store.reference_path(row.surface_hash)
         files = {
-            "surface": str(store.surface_path(row.surface_hash).resolve()),
+            "surface": str(store.scored_path(row.surface_hash).resolve()),
             "measure": str(store.uv_path(row.id).resolve()),
-            "reference": str(reference.resolve()) if reference.exists() else "",
+            "reference": _reference(store, row),
         }
         tasks.append(_Task(limits | files, began, ended(row)))
     pool.run(tasks, jobs)
     store.metrics(values)
+
+
+def _reference(store: Store, row: ResultRow) -> str:
+    """Where the map lies that the row's surface came with; "" if none came."""
+    path = store.reference_path(row.surface_hash)
+    return str(path.resolve()) if path.exists() else ""
 
 
 def _absolute(plugin: str) -> str:
@@ -318,6 +323,8 @@ def _surfaces(
             hashes[case] = ""
             continue
         hashes[case] = store.add_surface(surface)
+        if (exact := models.exact_points(case)) is not None:
+            store.add_exact(hashes[case], exact)
         if model and model.has_uv:
             store.add_reference(hashes[case], read_parameterized(models.path(case))[1])
         if model:
@@ -641,6 +648,7 @@ class _Book:
             "seed": cell.row.seed,
             "source_hash": cell.row.source_hash,
             "surface": str(self.store.surface_path(cell.row.surface_hash).resolve()),
+            "reference": _reference(self.store, cell.row),
         }
 
         def ended(outcome: dict[str, Any], printed: str, path: Path) -> None:

@@ -217,6 +217,10 @@ def _outcome(job: dict[str, Any]) -> Outcome:
     if registry.source_hash(method) != job["source_hash"]:
         return {"status": "failed", "reason": SOURCE_CHANGED}
     whole = read_surface(Path(job["surface"]))
+    if isinstance(whole, Mesh) and job["reference"] and "seams" in method.requires:
+        reference = read_map(Path(job["reference"]))
+        assert isinstance(reference, Parameterization)
+        whole = Mesh(whole.vertices, whole.faces, reference.seams(whole))
     preprocessing = ""
     try:
         surface, preprocessing = prepared(whole, method.requires)

@@ -75,6 +75,9 @@ REQUIREMENTS: dict[str, Callable[[Surface], str | None]] = {
     "disk_after_cut": _topology_unless(
         is_cuttable, "a connected, manifold, consistently oriented mesh (others have no disk cut)"
     ),
+    "seams": _topology_unless(
+        lambda mesh: mesh.seams is not None, "a mesh that came with a UV map, for its seams"
+    ),
     "points": lambda surface: (
         "takes a point cloud; the surface is a mesh" if isinstance(surface, Mesh) else None
     ),
