@@ -87,7 +87,8 @@ REQUIREMENTS: dict[str, Callable[[Surface], str | None]] = {
 
 `disk` takes a disk as it is and nothing else. `disk_after_cut` also takes what can be cut to one:
 a surface that is no disk (with or without holes) is cut before the method sees it, by the same
-automatic cut for every method, and the row says so.
+automatic cut for every method, and the row says so. `seams` admits meshes that came with a UV map,
+and the method finds in `Mesh.seams` where that is cut; no other method is shown them.
 """
 
 

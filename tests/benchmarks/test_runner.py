@@ -479,7 +479,7 @@ class Blind:
 def test_a_noisy_cloud_is_mapped_and_its_points_without_noise_are_scored(tmp_path):
     plugin = tmp_path / "projection.py"
     plugin.write_text(PROJECTION)
-    case = "saddle@noise=0.05"
+    case = "saddle@noise=0.005"
     trial = Suite("trial", "A trial", (case,), (), (0,))
     out = tmp_path / "out"
     run(trial, out, methods=["projection"], plugins=[f"{plugin}:Projection"])
