@@ -126,7 +126,6 @@ def test_source_hash_follows_the_method_s_own_modules_and_its_libraries(monkeypa
     assert registry.source_hash(SLIM()) != hashes["slim"]
 
 
-@pytest.mark.usefixtures("_no_plugins")
 def test_source_hash_follows_what_a_method_builds_on(monkeypatch):
     name, made = registry.method("parapoint+slim")
     assert name == "parapoint+slim"
@@ -135,6 +134,7 @@ def test_source_hash_follows_what_a_method_builds_on(monkeypatch):
     assert registry.source_hash(made) != before
 
 
+@pytest.mark.usefixtures("_no_plugins")
 def test_source_hash_of_a_plugin_does_not_depend_on_its_folder(tmp_path):
     made = []
     for folder in ("a", "b", "c"):
