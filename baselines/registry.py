@@ -41,6 +41,8 @@ METHODS: dict[str, str] = {
     "meshed": "baselines.meshed:Meshed",
     "external": "baselines.external:External",
     "parapoint": "parapoint.estimator:ParaPoint",
+    "fam": "baselines.fam:FAM",
+    "nuvo": "baselines.nuvo:Nuvo",
 }
 """Name -> "module:Class" of each method that comes with the benchmark."""
 

@@ -43,7 +43,7 @@ def training_rates(preset: str = "paper") -> list[Rate]:
     import torch
 
     from parapoint.estimator import ParaPoint
-    from parapoint.networks import products
+    from parapoint.networks import SubNetworks, products
     from parapoint.presets import PRESETS
     from parapoint.trainer import Trainer
 
@@ -62,6 +62,7 @@ def training_rates(preset: str = "paper") -> list[Rate]:
     for count in STEPS:
         trainer = Trainer(points[:count], numbers, seed=0, device="cpu")
         steps = trainer.run()
+        assert isinstance(trainer.networks, SubNetworks)
         there, back = products(trainer.networks)
         lattice = round(count**0.5) ** 2
         operations = 3 * 2 * (there * count + back * lattice)  # the backward pass is two more

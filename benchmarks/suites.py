@@ -40,6 +40,8 @@ REDUCED = "points=4096, iterations=2800, subset=256, all_from=0.997"
 PAPER_REDUCED = f"parapoint(preset=paper, {REDUCED})"
 PAPER_SHORT = "parapoint(preset=paper, points=2048, iterations=300, subset=256, all_from=0.99)"
 FAST = "parapoint(preset=fast, time_budget=120)"
+# Neural maps under one budget: seconds of training, points of a step.
+EQUAL = "points=4096, subset=256, time_budget=300"
 
 HYBRID = "parapoint+slim(time_budget=120)"
 LEARNED_SEAM = "parapoint+slim(time_budget=120, price=None)"
@@ -137,6 +139,17 @@ SUITES: dict[str, Suite] = {
             "All well-behaved models",
             tuple(dict.fromkeys([*PAPER_CASES, *WELL_BEHAVED])),
             (*MESH_METHODS, FAST),
+        ),
+        Suite(
+            "neural",
+            "Neural maps with 300 s of training each",
+            (*PAPER_CASES, "camelhead"),
+            (
+                f"parapoint(preset=paper, {EQUAL}, all_from=1.0)",
+                FAST,
+                f"fam({EQUAL})",
+                f"nuvo({EQUAL})",
+            ),
         ),
         Suite(
             "ablation",

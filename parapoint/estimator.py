@@ -309,6 +309,7 @@ class ParaPoint:
                 networks=start,
                 seconds=time.monotonic() - begun,
             )
+            assert isinstance(trainer.networks, SubNetworks)
             self.networks_ = trainer.networks
             self.trace_: tuple[TracePoint, ...] = ()
             store = None if checkpoint is None else _Checkpoint(Path(checkpoint), self._identity())

@@ -226,7 +226,25 @@ class Cycle(NamedTuple):
     grid: GridBranch | None
 
 
-class SubNetworks(nn.Module):
+class SurfaceNetworks(nn.Module):
+    """Networks made of stacks that map a surface to the plane; what a trainer can train."""
+
+    def train_in(self, precision: torch.dtype) -> None:
+        """Take the products of wide layers in this precision where gradients are asked for."""
+        for module in self.modules():
+            if isinstance(module, Stack):
+                module.precision = precision
+
+    def parameterization(self, points: Tensor) -> Tensor:
+        """(N, 3) points of the surface → (N, 2) points of the plane."""
+        raise NotImplementedError
+
+    def surface(self, uv: Tensor) -> Tensor:
+        """(N, 2) points of the plane → (N, 3) points of the surface."""
+        raise NotImplementedError
+
+
+class SubNetworks(SurfaceNetworks):
     """Deform, Cut, Stitch, Wrap and Unwrap, whatever is in them, and the maps made of them.
 
     Each maps (1 + T, N, C) points and tangents.
@@ -237,12 +255,6 @@ class SubNetworks(nn.Module):
     stitch: nn.Module
     wrap: nn.Module
     unwrap: nn.Module
-
-    def train_in(self, precision: torch.dtype) -> None:
-        """Take the products of wide layers in this precision where gradients are asked for."""
-        for module in self.modules():
-            if isinstance(module, Stack):
-                module.precision = precision
 
     def forward(self, points: Tensor | None, grid: Tensor | None) -> Cycle:
         """Both branches at points P and lattice G (M, 2); None leaves a branch out.

@@ -16,7 +16,7 @@ from scipy.spatial import ConvexHull, QhullError, cKDTree
 from torch import Tensor
 
 from parapoint import losses
-from parapoint.networks import ACTIVATIONS, Cycle, Networks, SubNetworks
+from parapoint.networks import ACTIVATIONS, Cycle, Networks, SurfaceNetworks
 from parapoint.presets import Preset
 from parapoint.surface import FloatArray
 
@@ -126,7 +126,7 @@ def _under(prefix: str, tensors: dict[str, Tensor]) -> dict[str, Tensor]:
 
 
 class Trainer:
-    """Fits the networks to one cloud.
+    """Fits the networks to one cloud. Another objective is a subclass with its own `terms`.
 
     Args:
         points: (N, 3) float32, centred, largest norm 1.
@@ -147,7 +147,7 @@ class Trainer:
         seed: int,
         device: str,
         time_budget: float | None = None,
-        networks: SubNetworks | None = None,
+        networks: SurfaceNetworks | None = None,
         seconds: float = 0.0,
     ) -> None:
         self.preset, self.time_budget = preset, time_budget
@@ -164,8 +164,10 @@ class Trainer:
         self.networks.train_in(PRECISIONS[self.precision])
         self.optimizer = AdamW(list(self.networks.parameters()), preset.weight_decay)
         self.device = device
-        self.shape = self._prepared(points)
-        self.hull = self._prepared(hull_sample(points, len(points), seed))
+        self.shape = self.prepared(points)
+        self.hull = self.shape
+        if preset.warm_up:
+            self.hull = self.prepared(hull_sample(points, len(points), seed))
         self.noise = preset.perturbation * mean_spacing(points)
         self.iteration = 0
         self.seconds = seconds
@@ -183,6 +185,27 @@ class Trainer:
         names = ("unwrap", "wrap", "cycle", "distortion", "anti_flip", "unfolding")
         given = {name: float(getattr(self.preset, f"{name}_weight")) for name in names}
         return {name: weight for name, weight in given.items() if weight or name != "unfolding"}
+
+    def prepared(self, points: FloatArray) -> Tensor:
+        """(1, N, 3) points, or (3, N, 3) with their tangent frames where a term asks for these."""
+        rows = points[None]
+        if self.preset.unfolding_weight:
+            rows = np.concatenate([rows, tangent_frames(points)])
+        return torch.as_tensor(rows, dtype=torch.float32, device=self.device)
+
+    def terms(self, points: Tensor, grid: Tensor, given: Tensor) -> dict[str, Tensor]:
+        """The unweighted terms of the objective at a batch.
+
+        Args:
+            points: rows of `prepared`, some of the N points.
+            grid: (M, 2) a lattice in [−1, 1]².
+            given: (N, 3) all points.
+        """
+        cycle = self.networks(
+            points if self.preset.branches != "2d" else None,
+            grid if self.preset.branches != "3d" else None,
+        )
+        return objective_terms(self.preset, cycle, given)
 
     @property
     def progress(self) -> float:
@@ -269,13 +292,6 @@ class Trainer:
             raise DivergedError("training diverged twice, the second time with a smaller step")
         self._restore(self._good)
 
-    def _prepared(self, points: FloatArray) -> Tensor:
-        """(1, N, 3) points, or (3, N, 3) with their tangent frames where a term asks for these."""
-        rows = points[None]
-        if self.preset.unfolding_weight:
-            rows = np.concatenate([rows, tangent_frames(points)])
-        return torch.as_tensor(rows, dtype=torch.float32, device=self.device)
-
     def _fits(self, seconds: float) -> bool:
         """Whether a step of this length still ends within the time budget."""
         return self.time_budget is None or self.seconds + seconds <= self.time_budget
@@ -287,13 +303,8 @@ class Trainer:
 
     def _step(self) -> dict[str, float]:
         """One iteration: its unweighted terms and the weighted total."""
-        points, grid = self._batch()
-        cycle = self.networks(
-            points if self.preset.branches != "2d" else None,
-            grid if self.preset.branches != "3d" else None,
-        )
         try:
-            terms = objective_terms(self.preset, cycle, self._cloud()[0])
+            terms = self.terms(*self._batch(), self._cloud()[0])
         except losses.NotFiniteError:
             return {"total": math.nan}
         total = torch.stack([self.weights[name] * value for name, value in terms.items()]).sum()
@@ -308,7 +319,7 @@ class Trainer:
         return (last + (first - last) * cosine) * SMALLER_STEP**self.divergences
 
     def _batch(self) -> tuple[Tensor, Tensor]:
-        """Perturbed points of the phase (see `_prepared`) and a perturbed lattice (about n, 2)."""
+        """Perturbed points of the phase (see `prepared`) and a perturbed lattice (about n, 2)."""
         cloud = self._cloud()
         size = cloud.shape[1]
         if self._phase() != "all" and self.preset.subset < size:
@@ -321,7 +332,7 @@ class Trainer:
         return cloud + noise.to(self.device), grid.to(self.device)
 
     def _cloud(self) -> Tensor:
-        """All points that the phase is fitted to (see `_prepared`)."""
+        """All points that the phase is fitted to (see `prepared`)."""
         return self.hull if self._phase() == "hull" else self.shape
 
 

@@ -21,6 +21,8 @@ ARGUMENTS = {
     "parapoint+slim": {"points": 120, "iterations": 2},
     "meshed": {"reconstruction": "ball_pivoting"},  # the faster one
     "external": {"command": COPY},
+    "fam": {"points": 120, "subset": 100, "iterations": 2},
+    "nuvo": {"points": 120, "subset": 100, "iterations": 2},
     "parapoint": {"points": 120, "subset": 100, "iterations": 3, "threads": 1, "device": "cpu"},
 }
 
