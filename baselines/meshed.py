@@ -34,6 +34,7 @@ CLEANING: tuple[tuple[str, dict[str, object]], ...] = (
     ("meshing_re_orient_faces_coherently", {}),
     ("meshing_close_holes", {"maxholesize": 30}),
     ("meshing_remove_null_faces", {}),
+    ("meshing_repair_non_manifold_vertices", {}),  # that the lids have made
     ("meshing_remove_connected_component_by_face_number", {"mincomponentsize": 25}),
     ("meshing_remove_unreferenced_vertices", {}),
 )

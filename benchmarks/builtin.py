@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
+import igl
 import numpy as np
 from scipy.spatial import Delaunay
 
@@ -179,7 +180,10 @@ def torus(resolution: int = 24) -> Mesh:
 def sampled(
     mesh: Mesh, *, noise: float = 0.0, is_uneven: bool = False, count: int = SAMPLED_POINTS
 ) -> tuple[PointCloud, PointCloud]:
-    """A cloud sampled from a mesh at random, always the same, and its points before the noise.
+    """A cloud sampled from a mesh at random, always the same, and where its points belong.
+
+    A noisy point belongs at the nearest place of the mesh: from where it was drawn the noise has
+    moved it along the surface too, which no map can know.
 
     Args:
         mesh: what is sampled, by area.
@@ -202,9 +206,13 @@ def sampled(
     inside = u + v <= 1
     u, v = np.where(inside, u, 1 - u), np.where(inside, v, 1 - v)
     first, second, third = corners[face].transpose(1, 0, 2)
-    exact = first + u[:, None] * (second - first) + v[:, None] * (third - first)
+    drawn = first + u[:, None] * (second - first) + v[:, None] * (third - first)
+    if noise == 0:
+        return PointCloud(drawn), PointCloud(drawn)
     scale = noise * float(np.linalg.norm(np.ptp(mesh.vertices[mesh.referenced], axis=0)))
-    return PointCloud(exact + scale * rng.standard_normal(exact.shape)), PointCloud(exact)
+    noisy = drawn + scale * rng.standard_normal(drawn.shape)
+    nearest = igl.point_mesh_squared_distance(noisy, mesh.vertices, mesh.faces)[2]
+    return PointCloud(noisy), PointCloud(nearest)
 
 
 BUILTIN: dict[str, Callable[[], Mesh]] = {

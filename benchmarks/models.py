@@ -201,7 +201,7 @@ def _model_name(name: str) -> str:
 
 
 def _sampled(name: str) -> tuple[PointCloud, PointCloud]:
-    """The sampled cloud of a canonical name, and its points before the noise.
+    """The sampled cloud of a canonical name, and where its points belong on the model.
 
     Raises:
         InputError: the model has no faces; as for `load`.
@@ -214,7 +214,7 @@ def _sampled(name: str) -> tuple[PointCloud, PointCloud]:
 
 
 def exact_points(case: str) -> PointCloud | None:
-    """The points of a sampled cloud before the noise, on which its maps are scored; else None.
+    """Where the points of a noisy sampled cloud belong, there its maps are scored; else None.
 
     Raises:
         InputError: as for `load`.

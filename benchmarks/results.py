@@ -553,7 +553,8 @@ class Store:
     def _metrics_key(self, row: ResultRow, source: str) -> str:
         """What the metrics of a row depend on, as a hash: its map, any reference, their source."""
         reference = bool(row.surface_hash) and self.reference_path(row.surface_hash).exists()
-        text = f"{row.id} {row.uv_sha256} {reference} {source}"
+        exact = bool(row.surface_hash) and self.exact_path(row.surface_hash).exists()
+        text = f"{row.id} {row.uv_sha256} {reference} {exact} {source}"
         return hashlib.sha256(text.encode()).hexdigest()[:32]
 
     def _measured(self, row: ResultRow) -> dict[str, float]:
@@ -576,7 +577,7 @@ class Store:
         return self.folder / "references" / f"{surface_hash}.npz"
 
     def exact_path(self, surface_hash: str) -> Path:
-        """Where the points without noise lie of the cloud of that hash."""
+        """Where the points lie, without their noise, of the cloud of that hash."""
         return self.folder / "exact" / f"{surface_hash}.npz"
 
     def scored_path(self, surface_hash: str) -> Path:

@@ -144,19 +144,23 @@ def test_surfaces_face_outwards():
 
 
 def test_a_sampled_cloud_lies_on_the_mesh_and_its_noise_is_as_said():
-    mesh = wavy_sheet()
+    mesh = Mesh(wavy_sheet().vertices * [1, 1, 0], wavy_sheet().faces)
     cloud, exact = sampled(mesh, noise=0.01)
     assert cloud.points.shape == (SAMPLED_POINTS, 3)
     squared, _, _ = igl.point_mesh_squared_distance(exact.points, mesh.vertices, mesh.faces)
     assert_allclose(squared, 0, atol=1e-20)
     diagonal = np.linalg.norm(np.ptp(mesh.vertices, axis=0))
-    # Of 24,000 numbers the deviation is known to 0.5 %.
-    assert_allclose((cloud.points - exact.points).std(axis=0), 0.01 * diagonal, rtol=0.03)
+    # Straight up from a flat mesh; of 8,000 numbers the deviation is known to 1 %.
+    offset = cloud.points - exact.points
+    assert_allclose(offset[:, 2].std(), 0.01 * diagonal, rtol=0.04)
+    inside = (np.abs(cloud.points[:, :2] - 0.5) < 0.5).all(axis=1)
+    assert_allclose(offset[inside, :2], 0, atol=1e-12)
     again, _ = sampled(mesh, noise=0.01)
     assert_array_equal(cloud.points, again.points)
     clean, same = sampled(mesh)
     assert_array_equal(clean.points, same.points)
-    assert_array_equal(same.points, exact.points)
+    assert_allclose(clean.points[:, 2], 0)
+    assert len(np.unique(clean.points, axis=0)) == SAMPLED_POINTS
 
 
 def test_a_sampled_cloud_is_even_or_falls_tenfold():
