@@ -20,7 +20,7 @@ from baselines.flattening import (
     singular_values,
 )
 from baselines.packing import by_component
-from baselines.slim import DENSITIES, SLIM
+from baselines.slim import DENSITIES
 from baselines.tutte import tutte
 from parapoint.cutting import cut_along, cut_to_disk, edge_graph, edge_lengths, path_to
 from parapoint.errors import InputError
@@ -126,7 +126,7 @@ class ParaPointSLIM:
 class ArtistSLIM:
     """SLIM over each chart of the map that a model came with, its seams taken as they are.
 
-    Charts that are no disks, with or without holes, are cut to disks automatically (the report
+    SLIM starts from Tutte's embedding and is kept one to one, as along learned seams. Charts that are no disks, with or without holes, are cut to disks automatically (the report
     counts them); all are packed without a change of scale.
 
     Attributes:
@@ -136,32 +136,37 @@ class ArtistSLIM:
     iterations: int = 20
 
     requires: ClassVar[frozenset[str]] = frozenset({"manifold", "oriented", "seams"})
-    packages: ClassVar[tuple[str, ...]] = ("libigl",)
+    packages: ClassVar[tuple[str, ...]] = ("libigl", "shapely")
 
     def __post_init__(self) -> None:
         check_iterations(self.iterations)
 
-    def parameterize(self, surface: Surface, *, seed: int) -> Parameterization:
+    def parameterize(self, surface: Surface, *, seed: int) -> Parameterization:  # noqa: ARG002 (nothing is random)
         """The map in the scale of the surface.
 
         Raises:
             UnsupportedError: the surface is no mesh that came with a map.
             InputError: a triangle has no area.
-            FlatteningError: a chart has no start without flips, or its energy did not fall.
+            FlatteningError: a chart has no start without flips.
         """
         if not isinstance(surface, Mesh) or surface.seams is None:
             raise UnsupportedError("needs a mesh that came with a UV map")
-        completed = 0
+        completed = held = 0
 
         def mapped(chart: Mesh) -> Parameterization:
-            nonlocal completed
+            nonlocal completed, held
+            check_triangles(chart.vertices, chart.faces)
             if not is_planar_domain(chart):
                 chart, completed = cut_to_disk(chart), completed + 1
-            return SLIM(iterations=self.iterations).parameterize(chart, seed=seed)
+            run = _Run(chart)
+            run.begin(None)
+            run.improve(self.iterations)
+            held += run.held_steps
+            return Parameterization(run.uv, chart.faces)
 
         result = by_component(cut_along(surface, surface.seams), mapped)
         charts = int(result.charts().max()) + 1
-        report = {"start": "tutte", "charts": charts, "charts_cut_to_disks": completed}
+        report = {"charts": charts, "charts_cut_to_disks": completed, "held_steps": held}
         return Parameterization(result.uv, result.corners, report=report)
 
 
