@@ -25,7 +25,7 @@ from baselines.tutte import tutte
 from parapoint.cutting import cut_along, cut_to_disk, edge_graph, edge_lengths, path_to
 from parapoint.errors import InputError
 from parapoint.estimator import ParaPoint
-from parapoint.method import UnsupportedError, is_planar_domain
+from parapoint.method import UnsupportedError
 from parapoint.parameterization import Parameterization
 from parapoint.spanning import learned_seam, unfolded
 from parapoint.surface import FloatArray, IntArray, Mesh, Surface
@@ -102,7 +102,7 @@ class ParaPointSLIM:
         run.improve(self.iterations)
         if self.price is not None:
             length = float(edge_lengths(mesh)[seam].sum()) / run.unit
-            if length > 0 and is_planar_domain(mesh):
+            if length > 0 and mesh.is_planar_domain:
                 whole = _Run(mesh)
                 whole.begin(None)
                 whole.improve(self.iterations)
@@ -126,8 +126,9 @@ class ParaPointSLIM:
 class ArtistSLIM:
     """SLIM over each chart of the map that a model came with, its seams taken as they are.
 
-    SLIM starts from Tutte's embedding and is kept one to one, as along learned seams. Charts that are no disks, with or without holes, are cut to disks automatically (the report
-    counts them); all are packed without a change of scale.
+    SLIM starts from Tutte's embedding and is kept one to one, as along learned seams. Charts that
+    are no disks, with or without holes, are cut to disks automatically (the report counts them);
+    all are packed without a change of scale.
 
     Attributes:
         iterations: steps of SLIM, at least 1.
@@ -156,7 +157,7 @@ class ArtistSLIM:
         def mapped(chart: Mesh) -> Parameterization:
             nonlocal completed, held
             check_triangles(chart.vertices, chart.faces)
-            if not is_planar_domain(chart):
+            if not chart.is_planar_domain:
                 chart, completed = cut_to_disk(chart), completed + 1
             run = _Run(chart)
             run.begin(None)

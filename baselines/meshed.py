@@ -12,12 +12,12 @@ from scipy.spatial import cKDTree
 from baselines.flattening import FlatteningError
 from baselines.lscm import LSCM
 from baselines.meshlab import pymeshlab
-from baselines.packing import by_component
 from baselines.slim import SLIM
 from baselines.xatlas_charts import Xatlas
 from parapoint.errors import InputError
-from parapoint.method import UnsupportedError, prepared
+from parapoint.method import UnsupportedError
 from parapoint.parameterization import Parameterization, PointParameterization
+from parapoint.preparation import prepared
 from parapoint.surface import BoolArray, FloatArray, Mesh, PointCloud, Surface
 
 FLATTENINGS: dict[str, Xatlas | LSCM | SLIM] = {"xatlas": Xatlas(), "lscm": LSCM(), "slim": SLIM()}
@@ -53,7 +53,8 @@ class Meshed:
 
     It is cleaned as a user would do it, all by MeshLab: faces at edges with more than two removed,
     vertices of several fans split, faces turned alike, small holes filled, small components
-    dropped. Each component is then cut to a disk where the flattening needs one. A point gets the
+    dropped. What the flattening needs beyond (disks, one component at a time) is prepared as for
+    any mesh of the benchmark. A point gets the
     uv of the nearest place on the mesh, by barycentric coordinates. The report counts all of it.
 
     Attributes:
@@ -79,13 +80,12 @@ class Meshed:
         mesh, report = reconstructed(surface, self.reconstruction)
         method = FLATTENINGS[self.flattening]
 
-        def flattened(part: Mesh) -> Parameterization:
-            return method.parameterize(prepared(part, method.requires)[0], seed=seed)
-
         try:
-            flat = flattened(mesh) if self.flattening == "xatlas" else by_component(mesh, flattened)
+            ready = prepared(mesh, method.requires)
+            flat = ready.joined(ready.maps(method, seed))
         except (InputError, UnsupportedError) as error:  # of the mesh made here, not of the cloud
             raise FlatteningError(f"the reconstruction cannot be flattened: {error}") from None
+        assert isinstance(flat, Parameterization)
         uv, distance = carried(surface.points, mesh, flat)
         facts = {
             "charts": int(flat.charts().max()) + 1,

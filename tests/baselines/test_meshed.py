@@ -8,8 +8,9 @@ from baselines import registry
 from baselines.flattening import FlatteningError
 from baselines.meshed import carried
 from baselines.packing import by_component, on_shelves
-from parapoint.method import UnsupportedError, prepared
+from parapoint.method import UnsupportedError
 from parapoint.parameterization import Parameterization
+from parapoint.preparation import prepared
 from parapoint.surface import Mesh, PointCloud
 from parapoint.testing import irregular_disk
 
