@@ -195,6 +195,16 @@ def _is_sampled(name: str) -> bool:
     return "@" in name and not Path(name).is_file()
 
 
+def is_made_in_memory(case: str) -> bool:
+    """Whether a case is a built-in surface or a sampled cloud, and no file.
+
+    Raises:
+        InputError: as for `canonical_name`.
+    """
+    name = canonical_name(case)
+    return name in BUILTIN or _is_sampled(name)
+
+
 def _model_name(name: str) -> str:
     """The name of the model that a sampled cloud is made of; of all others the name itself."""
     return name.rpartition("@")[0] if _is_sampled(name) else name

@@ -17,7 +17,6 @@ from typing import Any, cast
 
 from baselines import registry
 from benchmarks import environment, executors, models
-from benchmarks.builtin import BUILTIN
 from benchmarks.executors import WORKER_LOST, Executor, Task
 from benchmarks.results import MISSING, SOURCE_CHANGED, ResultRow, Store, identity, plain
 from benchmarks.suites import Suite
@@ -316,13 +315,13 @@ def _surfaces(store: Store, cases: Sequence[str], summary: Summary) -> dict[str,
 def _origin(case: str, readers: str) -> str:
     """The content of a case's file and the hash of its readers, as one text; "" for what varies.
 
-    Built-in surfaces have no file, and a .gltf file names others.
+    Built-in surfaces and sampled clouds have no file, and a .gltf file names others.
     """
     model = models.info(case)
     path = Path(case)
     if model:
         return f"{model.sha256} {readers}"
-    if models.canonical_name(case) in BUILTIN or path.suffix.lower() == ".gltf":
+    if models.is_made_in_memory(case) or path.suffix.lower() == ".gltf":
         return ""
     with faults_of(path), path.open("rb") as stream:
         content = hashlib.file_digest(stream, "sha256").hexdigest()
