@@ -10,10 +10,28 @@ from benchmarks.environment import cores
 from parapoint import console
 
 
-@click.command(help="Write tables, figures and index.html for the results in DIR to DIR/report.")
+@click.command(
+    help=(
+        "Write tables, figures and index.html for the results in DIR to DIR/report. With "
+        "--against, write what moved since OTHER to DIR/report/history instead."
+    )
+)
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-def main(folder: Path) -> None:
-    """Write the report, and say where it is."""
+@click.option(
+    "--against",
+    metavar="OTHER",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    help="An earlier results folder, or another machine's; may be given several times.",
+)
+def main(folder: Path, against: tuple[Path, ...]) -> None:
+    """Write the report, or the comparisons, and say where they are."""
+    if against:
+        from reports import history
+
+        for page, said in history.write(folder, against):
+            print(f"{page}: {said}")
+        return
     from reports.report import write
 
     print(write(folder, jobs=cores()))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,6 +17,11 @@ from benchmarks.metrics import METRICS
 from benchmarks.results import ResultRow, Store
 from benchmarks.suites import SUITES
 from parapoint.errors import InputError
+from parapoint.parameterization import Parameterization
+from parapoint.surface import Mesh
+
+ANGLE, AREA = "angle_difference_mean", "area_discrepancy_total"
+FLIPPED, SPANNING = "flipped_fraction", "spanning_fraction"
 
 DISPLAY: dict[str, tuple[str, str]] = {
     "tutte": ("Tutte", "uniform weights"),
@@ -41,6 +47,10 @@ The order is that of the tables; methods from elsewhere stand between, ParaPoint
 
 TOLD = ("preset", "energy", "loss", "iterations", "points", "time_budget")
 """Parameters, or entries of a method's report, that are part of its name in a table."""
+
+
+BRANCHES = {"both": "both branches", "2d": "2D→3D→2D alone", "3d": "3D→2D→3D alone"}
+"""The ablations of ParaPoint's branches in words."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +99,8 @@ def _words(name: str, value: object) -> str:
     if isinstance(value, int | float) and not isinstance(value, bool):
         unit = {"time_budget": "s budget"}.get(name, name.replace("_", " "))
         return f"{value:,} {unit.removesuffix('s') if value == 1 else unit}"
-    return str(value).replace("_", " ").replace("dirichlet", "Dirichlet")
+    told = BRANCHES.get(str(value)) if name == "branches" else None
+    return told or str(value).replace("_", " ").replace("dirichlet", "Dirichlet")
 
 
 def _told(rows: Sequence[ResultRow], name: str) -> str:
@@ -97,8 +108,8 @@ def _told(rows: Sequence[ResultRow], name: str) -> str:
     values: list[Any] = []
     for row in rows:
         value = row.report.get(name)
-        value = row.params.get(name) if value is None else value
-        if value is not None and not isinstance(value, list | dict) and value not in values:
+        value = row.params.get(name) if value is None or isinstance(value, list | dict) else value
+        if value is not None and value not in values:
             values.append(value)
     if len(values) > 1 and all(isinstance(value, int | float) for value in values):
         return f"{min(values):,} to {_words(name, max(values))}"
@@ -118,23 +129,18 @@ def labels(rows: Iterable[ResultRow]) -> dict[tuple[str, str], Label]:
     for key in keys:
         method = key[0]
         name, fixed = DISPLAY.get(method, (method, ""))
-        told = [_told(by_key[key], entry) for entry in TOLD]
         siblings = [params[other] for other in keys if other[0] == method and other != key]
         differing = [
             entry
             for entry, value in params[key].items()
             if any(other.get(entry) != value for other in siblings)
         ]
-        told += [
-            f"{entry.replace('_', ' ')} {params[key][entry]}"
-            for entry in differing
-            if entry not in TOLD
-        ]
+        told = [_told(by_key[key], entry) for entry in dict.fromkeys([*TOLD, *differing])]
         short, rivals = name, siblings
         for entry in differing:
             fewer = [other for other in rivals if other.get(entry) == params[key][entry]]
             if len(fewer) < len(rivals):
-                short += f" {_words(entry, params[key][entry]) or 'default'}"
+                short = f"{short} {_words(entry, params[key][entry])}".rstrip()
                 rivals = fewer
         detail = ", ".join(part for part in (fixed, *told) if part)
         found[key] = Label(method, key[1], name, detail, short)
@@ -195,6 +201,32 @@ class Contents:
         good = [row for row in self.cell(case, label) if row.status == "ok"]
         return min(good, key=lambda row: row.seed) if good else None
 
+    def mesh(self, case: str) -> Mesh | None:
+        """The mesh of a model, None where it is not stored or no mesh."""
+        for row in self.rows:
+            if row.case == case and row.surface_hash:
+                try:
+                    surface = self.store.surface(row)
+                except InputError:
+                    return None
+                return surface if isinstance(surface, Mesh) else None
+        return None
+
+    def mapped(self, row: ResultRow) -> tuple[Mesh, Parameterization] | None:
+        """The mesh of a cell and its map; None where one is damaged or they do not fit."""
+        try:
+            surface, result = self.store.surface(row), self.store.result(row)
+        except InputError:
+            return None
+        if not isinstance(surface, Mesh) or not isinstance(result, Parameterization):
+            return None
+        return (surface, result) if len(result.corners) == len(surface.faces) else None
+
+    def has_artist(self, case: str) -> bool:
+        """Whether the model came with a map of its own."""
+        hashes = {row.surface_hash for row in self.rows if row.case == case and row.surface_hash}
+        return any(self.store.reference_path(name).exists() for name in hashes)
+
     @cached_property
     def atlases(self) -> frozenset[str]:
         """Short names of the methods that cut most surfaces into many charts: no rivals.
@@ -239,6 +271,22 @@ class Contents:
         numbers = ["seconds", *METRICS]
         return frame.astype(dict.fromkeys(numbers, "float64"))
 
+    @cached_property
+    def records(self) -> dict[tuple[str, str], dict[str, Any]]:
+        """The rows of `means` by (case, label)."""
+        return {
+            (record["case"], record["label"]): {str(k): v for k, v in record.items()}
+            for record in self.means.to_dict("records")
+        }
+
+
+def number(record: Mapping[str, object] | None, name: str) -> float | None:
+    """The value of a metric in a row of `Contents.means`, or None where there is none."""
+    value = record.get(name) if record else None
+    if not isinstance(value, int | float) or math.isnan(value):
+        return None
+    return float(value)
+
 
 def contents(folder: Path) -> list[Contents]:
     """What `folder` holds, suite by suite.
@@ -267,5 +315,7 @@ def contents(folder: Path) -> list[Contents]:
             label=part["id"].map(lambda key, by_id=by_id: by_id[key].short),
             seconds=part["id"].map(seconds).astype("float64"),
         )
+        # A learned seam that faces span has no edges: 0 would read, and rank, as no seam at all.
+        part.loc[part[SPANNING] > 0, ["seam_length", "seam_excess"]] = math.nan
         found.append(Contents(store, suite, own, by_id, part))
     return found

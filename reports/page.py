@@ -14,9 +14,10 @@ from benchmarks.metrics import METRICS
 from benchmarks.results import ResultRow
 from parapoint.errors import InputError
 from reports.contents import Contents, Label, suite_title
-from reports.figures import Drawn, values_text
+from reports.figures import Drawn
+from reports.galleries import values_text
 from reports.pictures import MAP_PICTURES, map_file, model_file, slug
-from reports.tables import Table, grouped
+from reports.table import Table, grouped
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from benchmarks.results import ResultRow, Store
 from parapoint.errors import InputError
 from parapoint.parameterization import Parameterization
 from parapoint.surface import BoolArray, FloatArray, Mesh
-from reports import render
+from reports import clouds, render
 from reports.contents import Contents
 from reports.render import Camera, Floats, Image, Scene, View
 
@@ -66,6 +66,11 @@ class Map:
     @cached_property
     def _state(self) -> MapState:
         return MapState(self.mesh, self.parameterization)
+
+    @property
+    def has_area(self) -> bool:
+        """Whether any face has an area in the plane: else there is nothing to see."""
+        return bool((self._state.triangles.uv_area != 0).any())
 
     @property
     def spanning(self) -> BoolArray:
@@ -209,6 +214,13 @@ def normal_colours(scene: Scene, camera: Camera) -> Floats:
 
 MODEL_PICTURES = ("mesh-1", "mesh-2")
 MAP_PICTURES = ("checker-1", "checker-2", "layout", "angle", "angle-uv", "area", "area-uv")
+ARTIST_PICTURES = ("artist-checker-1", "artist-layout")
+CLOUD_PICTURES = ("cloud", "cloud-uv", "dense", "seams")
+
+
+def kinds(row: ResultRow) -> tuple[str, ...]:
+    """The pictures of a cell: of points, too, for the one method that sees points alone."""
+    return MAP_PICTURES + CLOUD_PICTURES if row.method == "parapoint" else MAP_PICTURES
 
 
 def model_file(case: str, kind: str) -> str:
@@ -238,7 +250,7 @@ def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
     folder.mkdir(parents=True, exist_ok=True)
     record = folder / "keys.json"
     known = known_keys(record)
-    source = source_hash("render", "pictures")
+    source = source_hash("render", "pictures", "clouds")
     work: list[list[ResultRow]] = []
     keys: dict[str, str] = {}
     for case in contents.cases:
@@ -248,9 +260,11 @@ def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
         todo = []
         latest = rows[-1]
         wanted = {model_file(case, kind): (latest, "") for kind in MODEL_PICTURES}
+        if contents.store.reference_path(latest.surface_hash).exists():
+            wanted |= {model_file(case, kind): (latest, "artist") for kind in ARTIST_PICTURES}
         for row in rows:
             if row.status == "ok":
-                wanted |= {map_file(row, kind): (row, row.uv_sha256) for kind in MAP_PICTURES}
+                wanted |= {map_file(row, kind): (row, row.uv_sha256) for kind in kinds(row)}
         for name, (row, content) in wanted.items():
             text = f"{source} {row.surface_hash} {content}"
             keys[name] = hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -297,32 +311,52 @@ def draw_model(results: Path, rows: list[ResultRow], folder: Path) -> tuple[list
     try:
         surface = store.surface(rows[-1])
     except InputError as error:
-        files += [map_file(row, kind) for row in rows for kind in MAP_PICTURES]
+        files += [map_file(row, kind) for row in rows for kind in kinds(row)]
         return files, [f"{case}: no pictures: {error}"]
     if not isinstance(surface, Mesh):
-        files += [map_file(row, kind) for row in rows for kind in MAP_PICTURES]
+        files += [map_file(row, kind) for row in rows for kind in kinds(row)]
         return files, [f"{case}: a point cloud; only meshes are drawn"]
     scene = Scene(surface)
     cameras = render.two_cameras(scene)
     views = [scene.view(camera, SIZE, SAMPLES) for camera in cameras]
     for name, view in zip(files, views, strict=True):
         save(meshed(view), folder / name)
-    failed, faults = [], []
+    failed: list[str] = []
+    faults: list[str] = []
+    try:
+        artist = store.reference(rows[-1])
+    except InputError as error:
+        artist = None
+        failed += [model_file(case, kind) for kind in ARTIST_PICTURES]
+        faults.append(f"{case}: no picture of the artist's map: {error}")
+    if artist is not None:
+        found = Map(surface, artist)
+        layout = Layout(found).image(normal_colours(scene, views[0].camera))
+        for kind, image in zip(ARTIST_PICTURES, (textured(views[0], found), layout), strict=True):
+            save(image, folder / model_file(case, kind))
     for row in rows:
         if row.status != "ok":
             continue
         try:
             result = store.result(row)
         except InputError as error:
-            failed += [map_file(row, kind) for kind in MAP_PICTURES]
+            failed += [map_file(row, kind) for kind in kinds(row)]
             faults.append(f"{case}, {row.method}: no pictures: {error}")
             continue
-        if isinstance(result, Parameterization) and len(result.corners) == len(surface.faces):
-            for kind, image in map_images(scene, views, Map(surface, result)).items():
-                save(image, folder / map_file(row, kind))
-        else:
-            failed += [map_file(row, kind) for kind in MAP_PICTURES]
-            faults.append(f"{case}, {row.method}: no pictures: the map is not of this mesh")
+        fault = ""
+        if not isinstance(result, Parameterization) or len(result.corners) != len(surface.faces):
+            fault = "the map is not of this mesh"
+        elif not (found := Map(surface, result)).has_area:
+            fault = "the map has no area"
+        if fault:
+            failed += [map_file(row, kind) for kind in kinds(row)]
+            faults.append(f"{case}, {row.method}: no pictures: {fault}")
+            continue
+        made = dict(map_images(scene, views, found))
+        if CLOUD_PICTURES[0] in kinds(row):
+            made |= cloud_images(scene, views[0], found)
+        for kind, image in made.items():
+            save(image, folder / map_file(row, kind))
     return failed, faults
 
 
@@ -340,6 +374,13 @@ def map_images(scene: Scene, views: list[View], found: Map) -> Mapping[str, Imag
         "area": first.image(area[first.face]),
         "area-uv": layout.image(area),
     }
+
+
+def cloud_images(scene: Scene, view: View, found: Map) -> Mapping[str, Image]:
+    """The pictures of a map that are made of points, by their kind."""
+    colours = normal_colours(scene, view.camera)
+    uv = found.uv - found.uv.min(axis=(0, 1))
+    return clouds.images(view, uv, found.spanning, colours, FIELDS / scene.size)
 
 
 def save(image: npt.NDArray[np.uint8], path: Path) -> None:

@@ -373,20 +373,7 @@ class View:
         if lit:
             light, gloss = self.light
             colours = colours * light[:, None] + gloss[:, None]
-        height, width = self.shape
-        grid = np.zeros((height * self.samples * width * self.samples, 4), dtype=np.float32)
-        grid[self.sample, :3] = np.minimum(colours, 1)
-        grid[self.sample, 3] = 1
-        blocks = grid.reshape(height, self.samples, width, self.samples, 4)
-        pixels = np.zeros((height, width, 4), dtype=np.float32)
-        for row in range(self.samples):
-            for column in range(self.samples):
-                pixels += blocks[:, row, :, column]
-        pixels /= self.samples**2
-        cover = pixels[..., 3:]
-        pixels[..., :3] /= np.where(cover > 0, cover, 1)
-        levels = np.round(255 * np.concatenate([_srgb(pixels[..., :3]), cover], axis=2))
-        return np.asarray(levels, dtype=np.uint8)
+        return averaged(self.shape, self.samples, self.sample, colours)
 
     def checker(self, uv: FloatArray | Floats, squares: float) -> Floats:
         """(S, 3) a linear checkerboard, `squares` fields to a unit of `uv` (F, 3, 2), antialiased.
@@ -460,6 +447,28 @@ class View:
                 cell = ((y + dy) * width + x + dx)[inside]
                 marked[cell[np.abs(depth[cell] - near[inside]) < allowance]] = True
         return marked[self.sample]
+
+
+def averaged(shape: tuple[int, int], samples: int, sample: IntArray, colours: Floats) -> Image:
+    """The picture of (height, width) pixels whose samples have linear `colours` (S, 3).
+
+    `sample` (S,) is the place of each in the grid of `samples` by `samples` a pixel; what it does
+    not name is clear.
+    """
+    height, width = shape
+    grid = np.zeros((height * samples * width * samples, 4), dtype=np.float32)
+    grid[sample, :3] = np.minimum(colours, 1)
+    grid[sample, 3] = 1
+    blocks = grid.reshape(height, samples, width, samples, 4)
+    pixels = np.zeros((height, width, 4), dtype=np.float32)
+    for row in range(samples):
+        for column in range(samples):
+            pixels += blocks[:, row, :, column]
+    pixels /= samples**2
+    cover = pixels[..., 3:]
+    pixels[..., :3] /= np.where(cover > 0, cover, 1)
+    levels = np.round(255 * np.concatenate([_srgb(pixels[..., :3]), cover], axis=2))
+    return np.asarray(levels, dtype=np.uint8)
 
 
 def _wave_integral(x: Floats) -> Floats:

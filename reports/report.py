@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from reports import figures, pictures, tables
+from reports import figures, formats, pictures, tables
 from reports.contents import contents
 from reports.page import Section, page
 
@@ -23,7 +23,7 @@ def write(folder: Path, *, jobs: int) -> Path:
     for suite in contents(folder):
         made = tables.tables(suite)
         name = pictures.slug(suite.suite)
-        write_tables([*made, tables.everything(suite)], report / "tables" / name)
+        formats.write([*made, tables.everything(suite)], report / "tables" / name)
         drawn_in = report / "figures" / name
         faults = pictures.draw(suite, drawn_in / "pictures", jobs)
         drawn = figures.draw(suite, drawn_in / "pictures", drawn_in, jobs)
@@ -31,12 +31,3 @@ def write(folder: Path, *, jobs: int) -> Path:
     index = report / "index.html"
     index.write_text(page(folder, sections), encoding="utf-8")
     return index
-
-
-def write_tables(made: list[tables.Table], folder: Path) -> None:
-    """Write each table as LaTeX, Markdown and CSV."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for table in made:
-        (folder / f"{table.name}.tex").write_text(tables.latex(table), encoding="utf-8")
-        (folder / f"{table.name}.md").write_text(tables.markdown(table), encoding="utf-8")
-        (folder / f"{table.name}.csv").write_text(tables.comma_separated(table), encoding="utf-8")

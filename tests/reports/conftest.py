@@ -21,7 +21,7 @@ from benchmarks.results import (
 )
 from parapoint.parameterization import Parameterization, TracePoint
 from parapoint.surface import Mesh
-from reports import figures, pictures, render
+from reports import clouds, pictures, render, style
 from reports.report import write
 
 HAND, DEVIL, NEFERTITI = "hand_1_i_f5000", "mannequin-devil", "nefertiti-lowres_odedstein"
@@ -91,11 +91,13 @@ class Writer:
 
 
 def draw_small(patch: pytest.MonkeyPatch) -> None:
-    """Small pictures and few rays."""
+    """Small pictures, few rays and few points."""
+    patch.setattr(clouds, "SPARSE", 400)
+    patch.setattr(clouds, "DENSE", 4000)
     patch.setattr(pictures, "SIZE", 48)
     patch.setattr(render, "OCCLUSION_RAYS", 0)
     patch.setattr(render, "FINE_FACES", 0)
-    patch.setitem(figures.STYLE, "savefig.dpi", 40)
+    patch.setitem(style.STYLE, "savefig.dpi", 40)
 
 
 @pytest.fixture(autouse=True)

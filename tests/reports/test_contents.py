@@ -40,7 +40,30 @@ def test_labels_name_energy_iterations_and_only_what_differs(tmp_path):
     assert [label.text for label in found.values()][1] == (
         "SLIM (symmetric Dirichlet, 20 iterations)"
     )
-    assert [label.text for label in found.values()][-1] == "ParaPoint (fast, lr 0.2)"
+    assert [label.text for label in found.values()][-1] == "ParaPoint (fast, 0.2 lr)"
+
+
+def test_variants_are_told_by_their_change_and_the_default_by_its_report(tmp_path):
+    report = {"distortion": "conformal", "branches": "both"}
+    base = {"preset": "paper", "distortion": None, "branches": None}
+    found = labels(
+        rows(
+            tmp_path,
+            ("parapoint", base, {"report": report}),
+            ("parapoint", base | {"distortion": "isometric"}, {}),
+            ("parapoint", base | {"branches": "2d"}, {"report": report | {"branches": "2d"}}),
+        )
+    )
+    assert [label.short for label in found.values()] == [
+        "ParaPoint",
+        "ParaPoint isometric",
+        "ParaPoint 2D→3D→2D alone",
+    ]
+    assert [label.detail for label in found.values()] == [
+        "paper, conformal, both branches",
+        "paper, isometric",
+        "paper, conformal, 2D→3D→2D alone",
+    ]
 
 
 def test_a_label_says_what_the_reports_say(tmp_path):

@@ -5,9 +5,11 @@ import numpy as np
 import pytest
 from matplotlib.text import Text
 
-from reports import figures
+from reports import figures, galleries, plots
 from reports.contents import contents
-from reports.figures import draw, drawings, leading, look, plain_log, write
+from reports.figures import draw, drawings, write
+from reports.galleries import leading
+from reports.style import figure, lighten, look, plain_log, wrapped
 
 from .conftest import HAND, NEFERTITI, Writer, flat, sheet
 
@@ -25,7 +27,7 @@ def test_every_figure_is_written_with_a_caption(reported):
     folder = reported / "report" / "figures" / "paper"
     suite = contents(reported)[0]
     names = [one.name for one in drawings(suite, folder)]
-    assert names[:2] == ["models", "disks"]
+    assert names[:3] == ["models", "disks", "clouds"]
     assert len(names) == len(set(names))
     for name in names:
         assert (folder / f"{name}.pdf").read_bytes().startswith(b"%PDF")
@@ -61,7 +63,7 @@ def test_the_same_results_give_the_same_bytes(suite, tmp_path):
 
 def test_the_supplements_figure_shows_slim_isometric_beside_parapoint(suite, tmp_path):
     assert leading(suite, "slim").short == "SLIM symmetric Dirichlet"
-    found = texts(figures.disks(suite, tmp_path))
+    found = texts(galleries.disks(suite, tmp_path, suite.cases[:2]))
     assert "SLIM: UV" in found
     assert "ParaPoint: view 2" in found
     assert not any(NEFERTITI in text for text in found)
@@ -69,13 +71,14 @@ def test_the_supplements_figure_shows_slim_isometric_beside_parapoint(suite, tmp
 
 
 def test_the_closed_models_figure_says_what_cut_it_and_why_a_map_is_missing(suite, tmp_path):
-    found = texts(figures.cut_model(suite, NEFERTITI, tmp_path))
+    found = texts(galleries.cut_model(suite, NEFERTITI, tmp_path))
     assert "skipped" in found
     assert any(text.startswith("(c) ParaPoint") for text in found)
+    assert not any("hand-made" in text for text in found)  # nefertiti has no map of its own
 
 
 def test_convergence_draws_the_quality_along_the_way(suite):
-    made = figures.convergence(suite)
+    made = plots.convergence(suite, suite.cases)
     panel = next(place for place in made.axes if place.get_title() == HAND)
     lines = {line.get_label(): line for line in panel.get_lines()}
     seconds, angles = lines["SLIM symmetric Dirichlet"].get_data()
@@ -87,7 +90,7 @@ def test_convergence_draws_the_quality_along_the_way(suite):
 
 
 def test_losses_are_those_of_the_trace(suite):
-    made = figures.losses(suite)
+    made = plots.losses(suite, suite.cases)
     assert [place.get_title() for place in made.axes] == [HAND, "mannequin-devil"]
     lines = {line.get_label(): line for line in made.axes[0].get_lines()}
     np.testing.assert_allclose(lines["total"].get_ydata(), [1, 1 / 2, 1 / 3])
@@ -99,10 +102,15 @@ def test_singular_values_of_an_isometry_peak_at_one(tmp_path):
     writer = Writer(tmp_path)
     with writer.store.writing():
         writer.cell(HAND, plane, "lscm", {}, result=flat(plane))
-    made = figures.singular_values(contents(tmp_path)[0])
-    first = made.axes[0].get_lines()[0]
-    assert first.get_ydata().max() == pytest.approx(1.0)
-    assert abs(first.get_xdata()[first.get_ydata().argmax()]) < 0.2
+    suite = contents(tmp_path)[0]
+    bins = np.linspace(-5, 5, 81)
+    shares = plots.singular_value_shares(suite, suite.rows[0], bins)
+    np.testing.assert_allclose(shares.sum(axis=1), 1)
+    for share in shares:
+        assert share.max() == pytest.approx(1)
+        assert abs(bins[share.argmax()]) < 0.2
+    line = plots.singular_values(suite, [HAND]).axes[0].get_lines()[0]
+    assert abs(line.get_xdata()[line.get_ydata().argmax()]) < 0.2
 
 
 def test_every_method_looks_different(suite):
@@ -128,7 +136,7 @@ def test_a_figure_can_be_made_in_another_process(suite, tmp_path):
 
 
 def test_log_axes_have_plain_numbers():
-    made = figures.figure(2, 2)
+    made = figure(2, 2)
     place = made.add_subplot()
     place.plot([1, 2], [0.004, 30])
     place.set_yscale("log")
@@ -137,3 +145,57 @@ def test_log_axes_have_plain_numbers():
     shown = [label.get_text() for label in place.yaxis.get_ticklabels()]
     assert "0.01" in shown
     assert not any("10^" in text for text in shown)
+
+
+def test_a_figure_of_many_models_goes_over_several_pages(suite):
+    cases = [f"case {number}" for number in range(10)]
+    made = figures.paged(suite, "n", "T", "C", make=len, cases=cases, size=4)
+    assert [one.name for one in made] == ["n", "n-2", "n-3"]
+    assert [one.title for one in made] == ["T, 1 of 3", "T, 2 of 3", "T, 3 of 3"]
+    assert [one.figure() for one in made] == [4, 4, 2]
+    (one,) = figures.paged(suite, "n", "T", "C", make=len, cases=suite.cases[:1], size=4)
+    assert one.title == "T"
+    assert {row.case for row in one.rows} == {HAND}
+
+
+def test_an_ablation_shows_every_variant_and_the_paper_s_four(tmp_path):
+    writer = Writer(tmp_path)
+    changes = ({}, {"distortion": "isometric"}, {"branches": "2d"}, {"branches": "3d"})
+    base = {"distortion": None, "branches": None, "distortion_weight": None}
+    with writer.store.writing():
+        for case in ("cube_x", "eight_x"):
+            for change in changes:
+                writer.cell(case, sheet(), "parapoint", base | change, result=flat(sheet()))
+    suite = contents(tmp_path)[0]
+    names = [one.name for one in drawings(suite, tmp_path)]
+    assert {"ablation", "ablation-paper"} <= set(names)
+    found = texts(galleries.ablation(suite, tmp_path, suite.cases))
+    assert {"unchanged", "isometric", "2D→3D→2D alone"} <= set(found)
+    four = texts(galleries.ablation_of_the_paper(suite, tmp_path))
+    assert "(a) cube, conformal" in four
+    assert "(d) eight, 3D→2D→3D alone" in four
+
+
+def test_an_ablation_without_the_paper_s_cells_lacks_its_figure(suite, tmp_path):
+    assert galleries.ablation_of_the_paper(suite, tmp_path) is None
+    assert not any(one.name.startswith("ablation") for one in drawings(suite, tmp_path))
+
+
+def test_pictures_in_a_pdf_are_light_and_keep_their_place():
+    shades = np.linspace(0, 255, 64 * 64).reshape(64, 64)
+    smooth = np.stack([shades, shades[::-1], shades.T], axis=2).astype(np.uint8)
+    flat_colours = np.kron(np.eye(2, dtype=np.uint8) * 200, np.ones((32, 32), np.uint8))
+    made = figure(2, 1)
+    for number, picture in enumerate((smooth, np.stack([flat_colours] * 3, axis=2))):
+        made.add_axes((number / 2, 0, 0.5, 1)).imshow(picture)
+    lighten(made)
+    one, two = (place.images[0] for place in made.axes)
+    assert one.get_array().shape == (38, 38, 3)
+    assert list(one.get_extent()) == list(two.get_extent()) == [-0.5, 63.5, 63.5, -0.5]
+    np.testing.assert_array_equal(two.get_array()[..., 0], flat_colours)
+
+
+def test_names_are_parted_at_spaces_hyphens_and_underscores():
+    assert wrapped("SLIM symmetric Dirichlet", 15) == "SLIM symmetric\nDirichlet"
+    assert wrapped("nefertiti-lowres_odedstein", 20) == "nefertiti-lowres_\nodedstein"
+    assert wrapped("beetle", 3) == "beetle"

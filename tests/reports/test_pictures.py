@@ -10,7 +10,7 @@ from reports import pictures, render
 from reports.contents import contents
 from reports.pictures import Map, draw, heat, map_file, slug
 
-from .conftest import HAND, HOSTILE, NEFERTITI, ball, flat, lonlat, sheet
+from .conftest import HAND, HOSTILE, NEFERTITI, Writer, ball, flat, lonlat, sheet
 
 
 def test_slugs_are_safe_and_distinct():
@@ -64,7 +64,7 @@ def test_pictures_are_drawn_once_and_again_when_something_changed(results, tmp_p
     suite = contents(results)[0]
     assert draw(suite, tmp_path, 1) == []
     files = sorted(path.name for path in tmp_path.glob("*.png"))
-    assert len(files) == 3 * 2 + 7 * 7
+    assert len(files) == 3 * 2 + 7 * 7 + 3 * 4
     before = {name: (tmp_path / name).read_bytes() for name in files}
     stamps = {name: (tmp_path / name).stat().st_mtime_ns for name in files}
     (tmp_path / files[0]).unlink()
@@ -97,4 +97,24 @@ def test_a_damaged_map_is_told_and_the_rest_drawn(results, tmp_path):
     faults = draw(suite, tmp_path / "pictures", 1)
     assert len(faults) == 1
     assert "damaged" in faults[0]
-    assert len(list((tmp_path / "pictures").glob("*.png"))) == 3 * 2 + 6 * 7
+    assert len(list((tmp_path / "pictures").glob("*.png"))) == 3 * 2 + 6 * 7 + 3 * 4
+
+
+def test_the_artist_s_map_is_drawn_where_a_model_came_with_one(tmp_path):
+    mesh = sheet()
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        row = writer.cell(HAND, mesh, "lscm", {}, result=flat(mesh))
+        writer.store.add_reference(row.surface_hash, flat(mesh, 0.5))
+    suite = contents(tmp_path)[0]
+    folder = tmp_path / "pictures"
+    assert draw(suite, folder, 1) == []
+    made = [folder / pictures.model_file(HAND, kind) for kind in pictures.ARTIST_PICTURES]
+    assert all(path.exists() for path in made)
+    assert suite.has_artist(HAND)
+    made[0].unlink()
+    draw(suite, folder, 1)
+    assert made[0].exists()
+    writer.store.reference_path(row.surface_hash).write_bytes(b"torn")
+    made[0].unlink()
+    assert "no picture of the artist's map" in draw(suite, folder, 1)[0]

@@ -6,14 +6,16 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from parapoint import console
+from parapoint.parameterization import Parameterization
 from reports.__main__ import main
 from reports.contents import contents
 from reports.report import write
 
-from .conftest import HAND, Writer, sheet
+from .conftest import HAND, SLIM, Writer, flat, sheet
 
 VOID = {"meta", "img", "br", "link", "input", "hr"}
 
@@ -71,11 +73,13 @@ def test_the_page_is_whole_opens_from_disk_and_escapes(reported):
     assert source.index("<table") < source.index("<img")
 
 
-def test_every_table_is_there_in_three_formats(reported):
+def test_every_table_is_there_in_four_formats(reported):
     folder = reported / "report" / "tables" / "paper"
     names = {"conformality", "supplement", "comparison", "published", "failures", "cells"}
+    names |= {"success", "cuts"}
     assert {path.stem for path in folder.iterdir()} == names
-    assert all((folder / f"{n}{kind}").exists() for n in names for kind in (".tex", ".md", ".csv"))
+    kinds = (".tex", ".md", ".csv", ".html")
+    assert all((folder / f"{name}{kind}").exists() for name in names for kind in kinds)
 
 
 def test_failed_cells_only_give_a_report_that_says_so(tmp_path):
@@ -103,6 +107,22 @@ def test_a_half_written_folder_is_reported_without_what_is_lost(results, tmp_pat
     page = parsed(write(folder, jobs=1))
     assert "environment not recorded" in page.text
     assert "no pictures" in page.text
+
+
+def test_maps_that_do_not_fit_or_have_no_area_are_told_and_the_rest_is_reported(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        one = writer.cell("one", sheet(), "slim", SLIM, result=flat(sheet(), 0.3))
+        two = writer.cell("two", sheet(5), "slim", SLIM, result=flat(sheet(5)))
+        nothing = Parameterization(np.zeros((81, 2)), sheet().faces)
+        writer.cell("three", sheet(), "slim", SLIM, result=nothing)
+    paths = [writer.store.uv_path(row.id) for row in (one, two)]
+    contents_of = [path.read_bytes() for path in paths]
+    for path, content in zip(paths, contents_of[::-1], strict=True):
+        path.write_bytes(content)
+    text = parsed(write(tmp_path, jobs=1)).text
+    assert text.count("the map is not of this mesh") == 2
+    assert text.count("the map has no area") == 1
 
 
 def test_a_user_s_file_and_two_suites(tmp_path):

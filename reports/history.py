@@ -1,0 +1,517 @@
+"""Two results folders compared, before and after, or here and there: what moved beyond noise."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from benchmarks import regress
+from benchmarks.metrics import METRICS
+from benchmarks.results import ResultRow
+from parapoint.errors import InputError
+from reports import formats
+from reports.contents import Contents, contents
+from reports.pictures import slug
+from reports.table import Column, Table, Value, metric_title
+from reports.tables import SUMMARY_METRICS
+
+Floats = npt.NDArray[np.float64]
+
+WATCHED = tuple(name for name in SUMMARY_METRICS if name != "seconds")
+"""The metrics that are compared, over all faces and without those that span a seam."""
+
+DETERMINISTIC = frozenset(spec.partition("(")[0] for spec in regress.METHODS)
+"""Methods that are held to give one map each time; cells with several seeds may tell of others."""
+
+ROUNDING = 1e-6
+"""Relative change of such a method that other hardware may make."""
+
+ONE_SEED = 0.05
+"""Relative change taken for noise where a seeded method has one seed: nothing is known of it."""
+
+ONE_TIME, LEAST_SECONDS = 0.25, 0.1
+"""Change of a single time taken for noise: relative, and in seconds."""
+
+HARDWARE = ("cpu", "cores", "gpu")
+"""Entries of an environment without which times are not comparable."""
+
+Key = tuple[str, str, str, str]
+"""Suite, case, method and parameters as JSON: a cell but for its seed."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """The seeds of one cell in one folder.
+
+    Attributes:
+        short: the method's name in tables.
+        rows: by seed.
+        values: (n,) values over the seeds that ended well, by metric; and "seconds".
+    """
+
+    short: str
+    rows: Mapping[int, ResultRow]
+    values: Mapping[str, Floats]
+
+    @property
+    def maps(self) -> set[str]:
+        """Hashes of the maps."""
+        return {row.uv_sha256 for row in self.rows.values() if row.status == "ok"}
+
+    @property
+    def status(self) -> str:
+        """How the seeds ended, "ok" where all did."""
+        found = sorted({row.status.replace("_", " ") for row in self.rows.values()})
+        return " / ".join(found)
+
+    @property
+    def reason(self) -> str:
+        """Why one did not end well."""
+        return next((row.reason for row in self.rows.values() if row.status != "ok"), "")
+
+
+def groups(suites: Sequence[Contents]) -> dict[Key, Group]:
+    """The cells of a folder, seeds together."""
+    found: dict[Key, dict[int, ResultRow]] = {}
+    shorts: dict[Key, str] = {}
+    measured: dict[str, dict[str, Any]] = {}
+    for suite in suites:
+        for record in suite.measured.to_dict("records"):
+            measured[record["id"]] = {str(name): value for name, value in record.items()}
+        for row in suite.rows:
+            params = json.dumps({n: v for n, v in sorted(row.params.items()) if n != "device"})
+            key = (row.suite, row.case, row.method, params)
+            found.setdefault(key, {})[row.seed] = row
+            shorts[key] = suite.labels[row.id].short
+    return {
+        key: Group(
+            shorts[key],
+            rows,
+            {
+                name: np.array(
+                    [measured[row.id][name] for row in rows.values() if row.status == "ok"]
+                )
+                for name in (*WATCHED, "seconds")
+            },
+        )
+        for key, rows in found.items()
+    }
+
+
+@dataclass(frozen=True)
+class Move:
+    """A value that is not what it was.
+
+    Attributes:
+        key: the cell.
+        name: metric, or "seconds".
+        before, after: means over the seeds.
+        noise: change up to which nothing is said.
+        why: where the noise is from.
+    """
+
+    key: Key
+    name: str
+    before: float
+    after: float
+    noise: float
+    why: str
+
+    @property
+    def verdict(self) -> str:
+        """Which way it moved."""
+        if self.name != "seconds" and METRICS[self.name].better not in {"lower", "higher"}:
+            return "moved"
+        higher_is_better = self.name != "seconds" and METRICS[self.name].better == "higher"
+        return "better" if (self.after > self.before) == higher_is_better else "worse"
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """What two folders say of the same cells.
+
+    Attributes:
+        before, after: the folders.
+    """
+
+    before: Path
+    after: Path
+
+    @cached_property
+    def _suites(self) -> tuple[list[Contents], list[Contents]]:
+        return contents(self.before), contents(self.after)
+
+    @cached_property
+    def cells(self) -> tuple[dict[Key, Group], dict[Key, Group]]:
+        """The cells before, and after."""
+        return groups(self._suites[0]), groups(self._suites[1])
+
+    @cached_property
+    def shared(self) -> list[Key]:
+        """The cells in both, in the order of `after`."""
+        before, after = self.cells
+        return [key for key in after if key in before]
+
+    def only(self, side: int) -> list[Key]:
+        """The cells in one alone: 0 for `before`, 1 for `after`."""
+        other = self.cells[1 - side]
+        return [key for key in self.cells[side] if key not in other]
+
+    def group(self, key: Key) -> tuple[Group, Group]:
+        """A shared cell before and after."""
+        return self.cells[0][key], self.cells[1][key]
+
+    @cached_property
+    def machines(self) -> dict[str, tuple[str, str]]:
+        """Entries of the environment that differ, before and after."""
+        told = [_environment(suites) for suites in self._suites]
+        return {
+            name: (told[0].get(name, "unknown"), told[1].get(name, "unknown"))
+            for name in dict.fromkeys([*told[0], *told[1]])
+            if told[0].get(name) != told[1].get(name)
+        }
+
+    @property
+    def same_hardware(self) -> bool:
+        """Whether times may be compared: both ran on one, known, processor."""
+        known = all(_environment(suites).get("cpu") for suites in self._suites)
+        return known and not any(name in self.machines for name in HARDWARE)
+
+    @cached_property
+    def _repeats(self) -> dict[tuple[str, str], bool]:
+        """Of methods with several seeds somewhere, whether these gave one map each time."""
+        told: dict[tuple[str, str], bool] = {}
+        for cells in self.cells:
+            for (_, _, method, params), group in cells.items():
+                if sum(row.status == "ok" for row in group.rows.values()) > 1:
+                    same = len(group.maps) == 1
+                    told[method, params] = told.get((method, params), True) and same
+        return told
+
+    def is_deterministic(self, key: Key) -> bool:
+        """Whether the method gives one map each time, whatever the seed."""
+        return self._repeats.get((key[2], key[3]), key[2] in DETERMINISTIC)
+
+    @cached_property
+    def moves(self) -> list[Move]:
+        """The metrics that moved beyond noise; without spanning faces where that is another."""
+        found: dict[tuple[Key, float, float], Move] = {}
+        for key in self.shared:
+            for name in WATCHED:
+                move = self._move(key, name)
+                if move:
+                    found.setdefault((key, move.before, move.after), move)
+        return list(found.values())
+
+    @cached_property
+    def times(self) -> list[Move]:
+        """The times that moved beyond noise; none on different hardware."""
+        if not self.same_hardware:
+            return []
+        return [move for key in self.shared if (move := self._move(key, "seconds"))]
+
+    def _move(self, key: Key, name: str) -> Move | None:
+        """The move of a value beyond its noise, if any."""
+        old, new = self.group(key)
+        if name != "seconds" and old.maps == new.maps:
+            return None
+        first, second = old.values[name], new.values[name]
+        if not len(first) or not len(second):
+            return None
+        before, after = float(first.mean()), float(second.mean())
+        if before == after:
+            return None
+        if math.isinf(before) or math.isinf(after):
+            return Move(key, name, before, after, 0.0, "infinite")
+        noise, why = self._noise(key, name, first, second)
+        return Move(key, name, before, after, noise, why) if abs(after - before) > noise else None
+
+    def _noise(self, key: Key, name: str, first: Floats, second: Floats) -> tuple[float, str]:
+        """How far the mean may move by chance, and how that is known."""
+        size = max(abs(float(first.mean())), abs(float(second.mean())))
+        if name != "seconds" and self.is_deterministic(key):
+            if self.same_hardware:
+                return 0.0, "deterministic"
+            return ROUNDING * size, "deterministic, other hardware"
+        if len(first) > 1 and len(second) > 1:
+            return welch(first, second), f"95 % interval, {len(first)} and {len(second)} seeds"
+        if name == "seconds":
+            return max(ONE_TIME * size, LEAST_SECONDS), f"one seed: {ONE_TIME:.0%}"
+        return ONE_SEED * size, f"one seed: {ONE_SEED:.0%}"
+
+    def changed_maps(self) -> list[Key]:
+        """Deterministic cells whose map is not bit for bit what it was, both having ended well."""
+        return [
+            key
+            for key in self.shared
+            if self.is_deterministic(key)
+            and all(group.maps for group in self.group(key))
+            and self.group(key)[0].maps != self.group(key)[1].maps
+        ]
+
+
+def welch(first: Floats, second: Floats) -> float:
+    """Half of the 95 % confidence interval of the difference of two means (Welch 1947)."""
+    parts = [float(np.var(values, ddof=1)) / len(values) for values in (first, second)]
+    if sum(parts) == 0:
+        return 0.0
+    freedom = sum(parts) ** 2 / sum(
+        part**2 / (len(values) - 1) for part, values in zip(parts, (first, second), strict=True)
+    )
+    return float(stats.t.ppf(0.975, freedom)) * math.sqrt(sum(parts))
+
+
+def _environment(suites: Sequence[Contents]) -> dict[str, str]:
+    """What the cells of a folder ran on: commit, machine, versions; all values where several."""
+    runs = suites[0].store.environment()["runs"]
+    used = {row.run for suite in suites for row in suite.rows}
+    told: dict[str, set[str]] = {}
+    for number, run in enumerate(runs):
+        if number in used and isinstance(run, Mapping):
+            packages = run.get("packages")
+            entries = {name: run.get(name) for name in ("commit", *HARDWARE, "python")}
+            entries |= packages if isinstance(packages, dict) else {}
+            for name, value in entries.items():
+                told.setdefault(str(name), set()).add(_words(value))
+    return {name: ", ".join(sorted(values - {""})) for name, values in told.items()}
+
+
+def _words(value: object) -> str:
+    """An entry of an environment in words."""
+    if isinstance(value, list):
+        return ", ".join(map(str, value))
+    return "" if value is None else str(value)
+
+
+def summary(found: Comparison) -> Table:
+    """One row a suite and method: how many cells moved, which way, and the ratio of the times."""
+    rows: dict[tuple[str, str, str], dict[str, Value]] = {}
+    order = dict.fromkeys((key[0], key[2], key[3]) for key in found.shared)
+    for suite, method, params in order:
+        keys = [key for key in found.shared if (key[0], key[2], key[3]) == (suite, method, params)]
+        moves = [move for move in found.moves if move.key in keys]
+        pairs = [found.group(key) for key in keys]
+        ratios = [
+            float(new.values["seconds"].mean() / old.values["seconds"].mean())
+            for old, new in pairs
+            if len(old.values["seconds"]) and len(new.values["seconds"])
+        ]
+        worse = {move.key for move in moves if move.verdict == "worse"}
+        better = {move.key for move in moves if move.verdict == "better"}
+        rows[suite, method, params] = {
+            "suite": suite,
+            "method": pairs[0][1].short,
+            "cells": float(len(keys)),
+            "maps": float(sum(old.maps == new.maps for old, new in pairs)),
+            "status": float(sum(old.status != new.status for old, new in pairs)),
+            "better": float(len(better - worse)),
+            "worse": float(len(worse - better)),
+            "mixed": float(len(better & worse)),
+            "seconds": float(np.exp(np.mean(np.log(ratios)))) if ratios else None,
+        }
+    comparable = "" if found.same_hardware else " (other hardware: not comparable)"
+    blocks: dict[str, list[Mapping[str, Value]]] = {}
+    for row in rows.values():
+        blocks.setdefault(str(row["suite"]), []).append(row)
+    return Table(
+        name="summary",
+        title="What moved",
+        caption=(
+            "Cells that are in both folders, seeds together: those with the very same maps, those "
+            "that ended otherwise, those of which some metric moved beyond noise for the better, "
+            "for the worse, or both ways; and the time after over the time before (geometric mean)."
+        ),
+        columns=(
+            Column("suite", "Suite", text=True, once=True),
+            Column("method", "Method", text=True),
+            Column("cells", "cells", digits=0),
+            Column("maps", "same maps", digits=0),
+            Column("status", "ended otherwise", digits=0),
+            Column("better", "better", digits=0),
+            Column("worse", "worse", digits=0),
+            Column("mixed", "both ways", digits=0),
+            Column("seconds", f"time ratio{comparable}", digits=2),
+        ),
+        blocks=tuple(tuple(block) for block in blocks.values()),
+        notes=tuple(_notes(found)),
+    )
+
+
+def _notes(found: Comparison) -> Iterator[str]:
+    """What the two folders are, and what holds for all tables."""
+    yield f"Before: {found.before}. After: {found.after}."
+    for name, (old, new) in found.machines.items():
+        yield f"{name}: {old or 'none'} before, {new or 'none'} after."
+    if not found.same_hardware:
+        yield (
+            "The hardware is not the same, or not known: the times are shown, and nothing is "
+            "concluded from them."
+        )
+    yield (
+        "Noise: for a deterministic method none, but on other hardware "
+        f"{ROUNDING:g} of the value; with several seeds, the 95 % confidence interval "
+        f"of the difference (Welch); with one seed, {ONE_SEED:.0%} of the value, and "
+        f"{ONE_TIME:.0%} or {LEAST_SECONDS:g} s of the time."
+    )
+    changed = found.changed_maps()
+    if changed:
+        names = [f"{found.group(key)[1].short} on {key[1]}" for key in changed]
+        yield f"Deterministic, and yet another map, if only in its last digits: {', '.join(names)}."
+
+
+def _named(found: Comparison, key: Key, side: int = 1) -> dict[str, Value]:
+    """Suite, model and method of a cell."""
+    return {"suite": key[0], "case": key[1], "method": found.cells[side][key].short}
+
+
+_NAMES = (
+    Column("suite", "Suite", text=True),
+    Column("case", "Model", text=True),
+    Column("method", "Method", text=True),
+)
+
+
+def moved(found: Comparison) -> Table | None:
+    """Every metric and time that moved beyond noise, cell by cell; None where none did."""
+    blocks: dict[Key, list[Mapping[str, Value]]] = {}
+    for move in [*found.moves, *found.times]:
+        old, new = found.group(move.key)
+        blocks.setdefault(move.key, []).append(
+            {
+                **_named(found, move.key),
+                "metric": metric_title(move.name).removesuffix(" %"),
+                "before": move.before,
+                "after": move.after,
+                "change": move.after - move.before,
+                "noise": move.noise,
+                "why": move.why,
+                "changed": _changed(old, new),
+                "verdict": move.verdict,
+            }
+        )
+    if not blocks:
+        return None
+    return Table(
+        name="moved",
+        title="Beyond noise, cell by cell",
+        caption=(
+            "Every value that moved by more than its noise: means over the seeds that ended well. "
+            "Changed: the method's own source, or the surface it was given."
+        ),
+        columns=(
+            *(replace(column, once=True) for column in _NAMES),
+            Column("metric", "Metric", text=True),
+            Column("before", "before", digits=4),
+            Column("after", "after", digits=4),
+            Column("change", "change", digits=4),
+            Column("noise", "noise", digits=4),
+            Column("why", "Noise from", text=True),
+            Column("changed", "Changed", text=True),
+            Column("verdict", "Verdict", text=True),
+        ),
+        blocks=tuple(tuple(rows) for rows in blocks.values()),
+    )
+
+
+def _changed(old: Group, new: Group) -> str:
+    """What is not the same before a cell ran."""
+    known = {"source": "source_hash", "surface": "surface_hash"}
+    sides = [[getattr(row, name) for row in old.rows.values()] for name in known.values()]
+    others = [[getattr(row, name) for row in new.rows.values()] for name in known.values()]
+    pairs = zip(known, sides, others, strict=True)
+    return ", ".join(name for name, one, two in pairs if set(one) != set(two)) or "nothing"
+
+
+def ended(found: Comparison) -> Table | None:
+    """Cells that ended otherwise than before, with the reasons; None where none did."""
+    rows = []
+    for key in found.shared:
+        old, new = found.group(key)
+        if old.status != new.status:
+            rows.append(
+                {
+                    **_named(found, key),
+                    "before": old.status,
+                    "after": new.status,
+                    "reason": new.reason or old.reason,
+                }
+            )
+    if not rows:
+        return None
+    return Table(
+        name="ended",
+        title="Ended otherwise",
+        caption="Cells that did not end as they had, and why: after, or else before.",
+        columns=(
+            *_NAMES,
+            Column("before", "before", text=True),
+            Column("after", "after", text=True),
+            Column("reason", "Reason", text=True),
+        ),
+        blocks=(tuple(rows),),
+    )
+
+
+def alone(found: Comparison) -> Table | None:
+    """Cells in one folder alone; None where there are none."""
+    rows = [
+        {**_named(found, key, side), "where": ("before", "after")[side]}
+        for side in (0, 1)
+        for key in found.only(side)
+    ]
+    if not rows:
+        return None
+    return Table(
+        name="alone",
+        title="In one folder alone",
+        caption="Cells that have nothing to be compared with.",
+        columns=(*_NAMES, Column("where", "Only", text=True)),
+        blocks=(tuple(rows),),
+    )
+
+
+def write(folder: Path, others: Sequence[Path]) -> list[tuple[Path, str]]:
+    """Compare `folder` with each of `others`, which came before; each page written, and its lead.
+
+    To `folder`/report/history/OTHER: index.html, and every table in all formats.
+
+    Raises:
+        InputError: a folder is missing, holds no results, or is of a newer version; two are one.
+    """
+    written = []
+    for other in others:
+        if other.resolve() == folder.resolve():
+            raise InputError(f"{other}: a folder is not compared with itself; name another")
+        found = Comparison(other, folder)
+        tables = [summary(found), moved(found), ended(found), alone(found)]
+        made = [table for table in tables if table is not None]
+        into = folder / "report" / "history" / slug(other.resolve().name)
+        formats.write(made, into)
+        lead = said(found)
+        page = formats.html(f"{folder} against {other}", made, lead)
+        (into / "index.html").write_text(page, encoding="utf-8")
+        written.append((into / "index.html", lead))
+    return written
+
+
+def said(found: Comparison) -> str:
+    """The comparison in one line."""
+    if not found.shared:
+        return "The two folders have no cell in common."
+    moves = {move.key for move in found.moves}
+    worse = {move.key for move in found.moves if move.verdict == "worse"}
+    ends = sum(old.status != new.status for old, new in map(found.group, found.shared))
+    times = f"{len(found.times)} times moved" if found.same_hardware else "times are not comparable"
+    return (
+        f"Of {len(found.shared)} cells in both, {len(moves)} moved beyond noise, {len(worse)} of "
+        f"them for the worse in some metric; {ends} ended otherwise; {times}."
+    )

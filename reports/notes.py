@@ -1,0 +1,65 @@
+"""The lines under a table: where its numbers come from, what was done, what failed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from reports.contents import Contents
+
+
+def environment_note(contents: Contents) -> str:
+    """Where the numbers come from: machine, commit, versions, seeds."""
+    runs = contents.store.environment()["runs"]
+    used = {row.run for row in contents.rows}
+    said = []
+    for number, run in enumerate(runs):
+        if number not in used or not isinstance(run, Mapping):
+            continue
+        commit = str(run.get("commit") or "unknown")[:12]
+        changed = " with local changes" if run.get("dirty") else ""
+        said.append(
+            f"commit {commit}{changed}, {run.get('cpu') or 'unknown processor'}, "
+            f"{run.get('cores', '?')} cores, Python {run.get('python', '?')}"
+        )
+    seeds = sorted({row.seed for row in contents.rows})
+    places = "; ".join(dict.fromkeys(said)) or "environment not recorded"
+    return f"Run on: {places}. Seeds: {', '.join(map(str, seeds))}."
+
+
+def method_notes(contents: Contents) -> list[str]:
+    """What was done to a surface before a method saw it, and which methods are no rivals."""
+    notes = []
+    if contents.atlases:
+        notes.append(
+            f"Not ranked: {', '.join(sorted(contents.atlases))}, which cut the surface into many "
+            "charts; the others give one map of the whole."
+        )
+    steps: dict[str, set[str]] = {}
+    for row in contents.rows:
+        if row.preprocessing:
+            steps.setdefault(row.preprocessing, set()).add(row.case)
+    for step, cases in steps.items():
+        notes.append(
+            f"{step.capitalize()}, the same for every method that needs it: "
+            f"{', '.join(sorted(cases))}."
+        )
+    return notes
+
+
+def failure_notes(contents: Contents) -> list[str]:
+    """One line a way in which cells did not end well."""
+    reasons: dict[tuple[str, str, str], list[str]] = {}
+    for row in contents.rows:
+        if row.status != "ok":
+            key = (contents.labels[row.id].short, row.status.replace("_", " "), row.reason)
+            reasons.setdefault(key, []).append(row.case)
+    return [
+        f"{method} {status} on {', '.join(dict.fromkeys(cases))}: {reason or 'no reason given'}."
+        for (method, status, reason), cases in reasons.items()
+    ]
+
+
+def legend(contents: Contents) -> str:
+    """What the short names of the methods stand for."""
+    told = [f"{label.short}: {label.detail}" for label in contents.methods if label.detail]
+    return f"Methods. {'; '.join(told)}."

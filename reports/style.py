@@ -1,0 +1,202 @@
+"""The one style of all figures: fonts, colours, how pictures, panels and legends are set."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from PIL import Image as Images
+
+from reports.contents import Contents, Label
+
+STYLE: dict[Any, Any] = {
+    "font.family": "STIXGeneral",
+    "mathtext.fontset": "stix",
+    "font.size": 8.5,
+    "axes.titlesize": 9,
+    "axes.labelsize": 8.5,
+    "axes.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "0.9",
+    "grid.linewidth": 0.5,
+    "axes.axisbelow": True,
+    "xtick.labelsize": 7.5,
+    "ytick.labelsize": 7.5,
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+    "lines.linewidth": 1.3,
+    "pdf.fonttype": 42,
+    "savefig.dpi": 220,
+    "svg.hashsalt": "parapoint",
+}
+"""The fonts come with matplotlib; the text width of a paper is `WIDTH`."""
+
+WIDTH = 7.0
+"""Width of a figure, inches."""
+
+COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#7F7F7F", "#8C6D1F", "#000000")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+DASHES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
+OURS = "#D55E00"
+"""Okabe and Ito's colours; the vermilion is ParaPoint's alone."""
+
+
+def look(contents: Contents, label: Label) -> dict[str, Any]:
+    """Colour, dashes and marker of a method, the same in every figure."""
+    if label.method == "parapoint":
+        ours = [other for other in contents.methods if other.method == "parapoint"]
+        at = ours.index(label) % len(DASHES)
+        return {"color": OURS, "linestyle": DASHES[at], "marker": MARKERS[-1 - at]}
+    others = [other for other in contents.methods if other.method != "parapoint"]
+    at = others.index(label) % len(COLOURS)
+    return {"color": COLOURS[at], "linestyle": DASHES[at], "marker": MARKERS[at]}
+
+
+def figure(width: float, height: float) -> Figure:
+    """An empty figure, in inches, drawn without a screen."""
+    made = Figure(figsize=(width, height))
+    FigureCanvasAgg(made)
+    return made
+
+
+def put(place: Axes, path: Path) -> None:
+    """Show a picture on white at `place`, at the size it is printed; a note where there is none."""
+    place.set_axis_off()
+    try:
+        with Images.open(path) as image:
+            box = place.get_window_extent()
+            scale = STYLE["savefig.dpi"] / mpl.rcParams["figure.dpi"]
+            shown = image.convert("RGBA")
+            shown.thumbnail((round(box.width * scale), round(box.height * scale)))
+            white = Images.new("RGBA", shown.size, "white")
+            place.imshow(Images.alpha_composite(white, shown).convert("RGB"))
+    except OSError:
+        note(place, "no picture")
+
+
+def lighten(made: Figure) -> None:
+    """Make the pictures of a figure light, for a PDF, which holds them without loss.
+
+    Those that 256 colours do not change to the eye (a checkerboard, clay) get these and a fourth of
+    the bytes; smooth colours stay, at three fifths of the resolution.
+    """
+    for shown in made.findobj(AxesImage):
+        whole = Images.fromarray(np.asarray(shown.get_array()))
+        few = whole.quantize(255).convert("RGB")
+        if np.abs(np.asarray(few, dtype=np.int16) - np.asarray(whole)).mean() > 0.8:
+            few = whole.resize((round(0.6 * whole.width), round(0.6 * whole.height)))
+        extent = shown.get_extent()
+        shown.set_data(np.asarray(few))
+        shown.set_extent(extent)
+        shown.set_interpolation("none")  # resampled, it would have all colours again
+
+
+def note(place: Axes, text: str) -> None:
+    """A grey remark in the middle of `place`."""
+    place.set_axis_off()
+    place.text(
+        0.5, 0.5, text, ha="center", va="center", color="0.45", transform=place.transAxes, wrap=True
+    )
+
+
+def picture_grid(
+    heads: Sequence[str],
+    rows: Sequence[tuple[str, str, Sequence[Path | str]]],
+    *,
+    side: float,
+    left: float = 1.15,
+    bottom: float = 0.05,
+) -> Figure:
+    """Rows of pictures (paths; other text is printed in their place) under column heads.
+
+    Each row begins with a name and a smaller text below it. `side` is a picture's, in inches.
+    """
+    gap, top = 0.06, 0.28
+    width = left + len(heads) * (side + gap)
+    height = top + len(rows) * (side + gap) + bottom
+    made = figure(width, height)
+    for column, head in enumerate(heads):
+        x = (left + column * (side + gap) + side / 2) / width
+        made.text(x, 1 - 0.17 / height, head, ha="center", va="center", fontsize=8.5)
+    for number, (name, text, pictures) in enumerate(rows):
+        y = height - top - (number + 1) * (side + gap) + gap
+        lines = 0.175 * (name.count("\n") + 1)
+        made.text(0.04 / width, (y + side - 0.06) / height, name, va="top", fontsize=8.5)
+        made.text(
+            0.04 / width,
+            (y + side - 0.12 - lines) / height,
+            text,
+            va="top",
+            fontsize=7,
+            color="0.3",
+        )
+        for column, picture in enumerate(pictures):
+            x = left + column * (side + gap)
+            place = made.add_axes((x / width, y / height, side / width, side / height))
+            if isinstance(picture, Path):
+                put(place, picture)
+            else:
+                note(place, picture)
+    return made
+
+
+def wrapped(name: str, width: int = 20) -> str:
+    """`name` over several lines, parted at spaces, hyphens and underscores."""
+    lines = [""]
+    for piece in re.split(r"(?<=[-_ ])", name):
+        if lines[-1] and len((lines[-1] + piece).rstrip()) > width:
+            lines.append("")
+        lines[-1] += piece
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def small_multiples(
+    count: int, height: float = 2.1, *, left: float = 0.08, bottom: float = 0.82
+) -> tuple[Figure, list[Axes]]:
+    """A figure of `count` like panels, three in a row, with room for a legend below."""
+    across = min(3, count)
+    down = -(-count // across)
+    made = figure(WIDTH, down * height + bottom - 0.27)
+    grid = made.add_gridspec(
+        down,
+        across,
+        left=left,
+        right=0.975,
+        top=1 - 0.25 / (down * height + bottom - 0.27),
+        bottom=bottom / (down * height + bottom - 0.27),
+        hspace=0.45,
+        wspace=0.28,
+    )
+    return made, [made.add_subplot(grid[n // across, n % across]) for n in range(count)]
+
+
+def plain_log(axis: Axis) -> None:
+    """Ticks at 1, 2 and 5 of each decade, as plain numbers."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=7))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def legend_below(made: Figure, places: Sequence[Axes]) -> None:
+    """One legend for all panels, each method once."""
+    found: dict[str, Any] = {}
+    for place in places:
+        for handle, text in zip(*place.get_legend_handles_labels(), strict=True):
+            found.setdefault(text, handle)
+    if found:
+        made.legend(
+            list(found.values()), list(found), loc="lower center", ncols=min(4, len(found)),
+            columnspacing=1.4, handlelength=2.6,
+        )  # fmt: skip
