@@ -35,7 +35,7 @@ from parapoint.trainer import PRECISIONS, Step, Trainer, surface_sample
 
 logger = logging.getLogger("parapoint")
 
-FORMAT = 1
+FORMAT = 2
 """Version of saved models and checkpoints."""
 FEWEST_POINTS = 100
 """Distinct points that a fit needs."""

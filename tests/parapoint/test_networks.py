@@ -23,10 +23,9 @@ def plain(stack: Stack, x: torch.Tensor) -> torch.Tensor:
         ACTIVATIONS["leaky_relu"]: lambda z: torch.nn.functional.leaky_relu(z, 0.01),
         ACTIVATIONS["softplus"]: lambda z: torch.nn.functional.softplus(z, 10.0),
     }
-    layers = list(stack.layers)
-    for i in range(0, len(layers), 2):
-        x = torch.nn.functional.linear(x, layers[i], layers[i + 1])
-        if i + 2 < len(layers):
+    for i, layer in enumerate(stack.layers):
+        x = torch.nn.functional.linear(x, layer[:, :-1], layer[:, -1])
+        if i + 1 < len(stack.layers):
             x = functions[stack.activation](x)
     return x
 
@@ -56,6 +55,7 @@ def test_products_count_each_weight_once_for_a_point_and_each_tangent() -> None:
     unwrap, wrap, stitch = 3 + 2, 2 + 3, 3 + 3
     there, back = cut + unwrap, 3 * (wrap + stitch)
     assert products(net) == (there + back, deform + back + there)
+    assert products(net, tangents=2) == (3 * there + back, deform + back + there)
 
 
 @pytest.mark.parametrize("activation", ACTIVATIONS)
@@ -74,6 +74,28 @@ def test_tangents_are_columns_of_the_jacobian(activation: str) -> None:
     for i in range(6):
         jacobian = torch.autograd.functional.jacobian(lambda p: stack(p[None, None])[0, 0], x[i])
         torch.testing.assert_close(pushed[:, i].T, jacobian)
+
+
+@pytest.mark.parametrize("activation", ACTIVATIONS.values(), ids=ACTIVATIONS)
+def test_gradients_are_those_of_plain_autograd(activation: Activation) -> None:
+    # In float32 at the paper's sizes, by double backward: Jacobians as columns of autograd.grad.
+    stack = Stack(2, 3, HIDDEN, activation, generator())
+    x = torch.randn(40, 2, generator=generator())
+
+    def objective(value: torch.Tensor, tangents: torch.Tensor) -> torch.Tensor:
+        return value.square().sum() + tangents.square().mul(torch.arange(1.0, 4)).sum()
+
+    axes = torch.eye(2)[:, None].expand(2, 40, 2)
+    made = stack(torch.cat([x[None], axes]))
+    ours = torch.autograd.grad(objective(made[0], made[1:]), [*stack.layers])
+    at = x.clone().requires_grad_()
+    value = plain(stack, at)
+    rows = [torch.autograd.grad(value[:, c].sum(), at, create_graph=True)[0] for c in range(3)]
+    theirs = torch.autograd.grad(
+        objective(value, torch.stack(rows, dim=2).permute(1, 0, 2)), [*stack.layers]
+    )
+    for own, its in zip(ours, theirs, strict=True):
+        torch.testing.assert_close(own, its, rtol=1e-3, atol=1e-4 * float(its.abs().max()))
 
 
 @pytest.mark.parametrize("activation", ACTIVATIONS.values(), ids=ACTIVATIONS)
