@@ -85,6 +85,7 @@ def training_rates() -> list[Rate]:
                 bare,
             )
         model = ParaPoint(preset=preset, iterations=1, points=256, device="cpu").fit(points)
+        assert isinstance(model.networks_, SubNetworks)
         dense = np.resize(points, (MAPPED, 3))
         operations = 2 * MAPPED * (cost(model.networks_.cut) + cost(model.networks_.unwrap))
         bare = _bare_rate(numbers.hidden, BATCH["cpu"], backward=False)

@@ -1,4 +1,4 @@
-"""ParaPoint as it is written down at once: what `parapoint` is measured against for speed.
+"""ParaPoint as it is written down at once, and the race of `parapoint` against it.
 
 Plain torch layers, Jacobians by `torch.autograd.grad` with a graph (so the loss on them goes
 backward twice), neighbours by all distances, all 10,000 points in every iteration. The losses,
@@ -11,9 +11,16 @@ import itertools
 import math
 import time
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from rich.table import Table
+
+from benchmarks import models
+from benchmarks.metrics import evaluate
+from parapoint.errors import InputError
+from parapoint.parameterization import Parameterization
+from parapoint.surface import Mesh
 
 if TYPE_CHECKING:
     from torch import Tensor, nn
@@ -21,10 +28,74 @@ if TYPE_CHECKING:
     from parapoint.surface import FloatArray
 
 
+class Reached(NamedTuple):
+    """What a way to the map had reached.
+
+    Attributes:
+        what: the way.
+        iterations: steps of training.
+        cpu_seconds: processor time, all threads together.
+        angle_difference: mean over all corners, radians.
+    """
+
+    what: str
+    iterations: int
+    cpu_seconds: float
+    angle_difference: float
+
+
+def race(case: str, seconds: float, *, seed: int = 0) -> Iterator[Reached]:
+    """What `fast` and `smooth` reach on a mesh, and the straightforward way at 1, 2, 4, ... steps.
+
+    `fast` takes what it takes, the others `seconds` of processor time each.
+
+    Raises:
+        InputError: there is no such model, or it is no mesh.
+    """
+    from parapoint.estimator import ParaPoint, training_points
+    from parapoint.presets import PAPER
+
+    mesh = models.load(case)
+    if not isinstance(mesh, Mesh):
+        raise InputError(f"{case} is a cloud; the race needs a mesh")
+
+    def angle_difference(uv: FloatArray) -> float:
+        return evaluate(mesh, Parameterization(uv, mesh.faces))["angle_difference_mean"]
+
+    for preset, budget in (("fast", None), ("smooth", seconds)):
+        begin = time.process_time()
+        model = ParaPoint(preset=preset, time_budget=budget, seed=seed, device="cpu").fit(mesh)
+        spent = time.process_time() - begin
+        uv = model.transform(mesh.vertices)
+        yield Reached(preset, int(str(model.report_["iterations"])), spent, angle_difference(uv))
+    points = training_points(mesh, PAPER.points, seed)
+    centre = (points.min(axis=0) + points.max(axis=0)) / 2
+    scale = np.linalg.norm(points - centre, axis=1).max()
+    maps = straightforward_maps((points - centre) / scale, (mesh.vertices - centre) / scale, seed)
+    shown = 1
+    for iteration, (spent, uv) in enumerate(maps, start=1):
+        if iteration == shown or spent >= seconds:
+            shown *= 2
+            yield Reached("straightforward", iteration, spent, angle_difference(uv))
+        if spent >= seconds:
+            return
+
+
+def race_table(case: str, seconds: float) -> Table:
+    """`race` as a table."""
+    columns = ("what", "iterations", "processor s", "angle difference")
+    table = Table(*columns, title=f"Time to quality on {case}")
+    for row in race(case, seconds):
+        table.add_row(
+            row.what, str(row.iterations), f"{row.cpu_seconds:.1f}", f"{row.angle_difference:.4f}"
+        )
+    return table
+
+
 def straightforward_maps(
-    points: FloatArray, at: FloatArray, *, seed: int
+    points: FloatArray, at: FloatArray, seed: int
 ) -> Iterator[tuple[float, FloatArray]]:
-    """Seconds of training so far and the map (V, 2) of `at` (V, 3), after each iteration, for ever.
+    """Processor seconds of training and the map (V, 2) of `at` (V, 3) after each step, for ever.
 
     Args:
         points: (N, 3) training points, centred, largest norm 1.
@@ -79,7 +150,7 @@ def straightforward_maps(
     grid = torch.cartesian_prod(side, side)
     seconds = 0.0
     while True:
-        begin = time.perf_counter()
+        begin = time.process_time()
         S = offset(embed3, move3, P)
         Q = unwrap(S)
         S_cycle = wrap(Q)
@@ -107,7 +178,7 @@ def straightforward_maps(
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()
-        seconds += time.perf_counter() - begin
+        seconds += time.process_time() - begin
         with torch.no_grad():
             uv = unwrap(offset(embed3, move3, watched))
         yield seconds, np.asarray(uv, dtype=np.float64)

@@ -125,7 +125,7 @@ class _StackFunction(torch.autograd.Function):
             h = made
         h = h.to(layers[-1].dtype)
         ctx.save_for_backward(*layers, *inputs, h)
-        return _product(h.flatten(0, 1), layers[-1].t()).reshape(count, points, -1)
+        return _product(h.flatten(0, 1), layers[-1].t()).reshape(count, points, len(layers[-1]))
 
     @staticmethod
     @torch.autograd.function.once_differentiable
@@ -143,8 +143,8 @@ class _StackFunction(torch.autograd.Function):
                 return None, None, None, *reversed(of_layers)
             gradient = _product(gradient, layer[:, :-1])
             if not is_first:
-                ctx.activation.pull_(gradient.view(*h.shape[:2], -1), h[:, :, :-1])
-        of_input = gradient.reshape(*output_gradient.shape[:2], -1)
+                ctx.activation.pull_(gradient.view(h[:, :, :-1].shape), h[:, :, :-1])
+        of_input = gradient.reshape(inputs[0][:, :, :-1].shape)
         return of_input, None, None, *reversed(of_layers)
 
 
@@ -174,10 +174,13 @@ class Stack(nn.Module):
     def forward(self, x: Tensor) -> Tensor:
         """(1 + T, N, inputs) points and tangents → (1 + T, N, outputs).
 
-        `precision` holds in training; without gradients all is float32.
+        `precision` holds in training; without gradients all is float32, and no layer's input is
+        kept longer than the layer takes.
         """
-        precision = self.precision if torch.is_grad_enabled() else torch.float32
-        output: Tensor = _StackFunction.apply(x, self.activation, precision, *self.layers)  # type: ignore[no-untyped-call]
+        precision, layers = self.precision, list(self.layers)
+        if not torch.is_grad_enabled():
+            precision, layers = torch.float32, [layer.detach() for layer in layers]
+        output: Tensor = _StackFunction.apply(x, self.activation, precision, *layers)  # type: ignore[no-untyped-call]
         return output
 
 

@@ -105,6 +105,22 @@ def test_the_gradient_of_a_function_of_values_and_tangents(activation: Activatio
     assert torch.autograd.gradcheck(lambda x, *_: stack(x), (x, *stack.layers), eps=1e-7, atol=1e-5)
 
 
+@pytest.mark.parametrize("activation", ACTIVATIONS)
+def test_nothing_leaves_the_device_of_the_points(activation: str) -> None:
+    # "meta" stands for any device but the CPU: an operation across the two raises.
+    net = networks(activation).to("meta")
+    cycle = net(torch.empty(3, 9, 3, device="meta"), torch.empty(4, 2, device="meta"))
+    outputs = [output for branch in cycle for output in branch]
+    assert {output.device.type for output in outputs} == {"meta"}
+    torch.stack([output.sum() for output in outputs]).sum().backward()
+    assert {p.grad.device.type for p in net.parameters()} == {"meta"}
+
+
+def test_no_points_are_mapped_to_none() -> None:
+    with torch.no_grad():
+        assert networks().parameterization(torch.zeros(0, 3)).shape == (0, 2)
+
+
 def test_both_branches_are_the_compositions_of_the_paper() -> None:
     net = networks()
     points = torch.randn(9, 3, generator=generator())
