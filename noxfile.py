@@ -1,6 +1,7 @@
 """The project's commands: `nox` checks it, `nox -s bench` reproduces the tables."""
 
 import os
+import sys
 
 import nox
 
@@ -8,11 +9,12 @@ nox.options.default_venv_backend = "virtualenv"
 nox.options.sessions = ["lint", "types", "tests"]
 nox.options.reuse_existing_virtualenvs = True
 
-PACKAGES = ["parapoint", "baselines", "benchmarks", "reports"]
+EXTRAS = ("uvatlas", "uvunwrap")
+"""Extras of pyproject.toml that `nox -s bench -- --with NAME` adds; NAME may be blender, too."""
 
 
-def install(session: nox.Session) -> None:
-    session.install("-c", "constraints.txt", "-e", ".[bench,dev]")
+def install(session: nox.Session, *extras: str) -> None:
+    session.install("-c", "constraints.txt", "-e", f".[{','.join(['bench', 'dev', *extras])}]")
 
 
 @nox.session
@@ -27,14 +29,14 @@ def lint(session: nox.Session) -> None:
 @nox.session
 def types(session: nox.Session) -> None:
     """Mypy, strict."""
-    install(session)
+    install(session, "cluster")
     session.run("mypy")
 
 
 @nox.session
 def tests(session: nox.Session) -> None:
     """The test suite: `nox -s tests -- -k cutting` runs a part of it."""
-    install(session)
+    install(session, "cluster", "uvunwrap")
     # A process a core, each with one thread: more would only wait for each other.
     session.run(
         "pytest",
@@ -47,18 +49,43 @@ def tests(session: nox.Session) -> None:
     )
 
 
+def blender(session: nox.Session) -> str:
+    """The interpreter of an environment that holds Blender and nothing else, made at need.
+
+    bpy pins an old numpy, and has wheels for these Pythons only (5.0 for 3.11, 5.1 on for 3.13).
+    """
+    folder = session.cache_dir.absolute() / "blender"
+    interpreter = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+    if not interpreter.exists():
+        pythons = ["--python", "3.11", "--python", "3.13"]
+        session.run_install(sys.executable, "-m", "virtualenv", *pythons, folder, external=True)
+    session.run_install(interpreter, "-m", "pip", "install", "bpy>=4.3", external=True)
+    return str(interpreter)
+
+
 @nox.session
 def bench(session: nox.Session) -> None:
-    """Run a suite (default: paper) and write its report: `nox -s bench -- smoke`."""
-    install(session)
+    """Run a suite (default: paper) and write its report: `nox -s bench -- smoke`.
+
+    `--with blender` (or uvatlas, uvunwrap) first installs what these methods need.
+    """
     arguments = list(session.posargs)
+    wanted = []
+    while "--with" in arguments:
+        place = arguments.index("--with")
+        wanted += arguments[place + 1 : place + 2]
+        del arguments[place : place + 2]
+    if unknown := set(wanted) - {"blender", *EXTRAS}:
+        session.error(f"--with takes blender, {', '.join(EXTRAS)}; not {', '.join(unknown)}")
+    install(session, *(name for name in wanted if name != "blender"))
+    environment = {"PARAPOINT_BLENDER": blender(session)} if "blender" in wanted else {}
     if not arguments or arguments[0].startswith("-"):
         arguments.insert(0, "paper")
     if "--out" not in arguments:
         arguments += ["--out", f"results/{arguments[0]}"]
     if "--jobs" not in arguments:  # two cells with a thread each end sooner than one with two
         arguments += ["--jobs", str(min(os.cpu_count() or 1, 8))]
-    session.run("python", "-m", "benchmarks", "run", *arguments)
+    session.run("python", "-m", "benchmarks", "run", *arguments, env=environment)
     session.run("python", "-m", "reports", arguments[arguments.index("--out") + 1])
 
 

@@ -31,24 +31,31 @@ Run it, as it is or with other parameters:
 
 Check it: `parapoint.testing.check_method(Planar())` raises at the first promise that is broken.
 
-To share it, make it a package that names it in its `pyproject.toml`; wherever the package is
-installed, `planar` is then a method like any other:
+To share it, put this `pyproject.toml` beside it; wherever the folder is installed (`pip install
+./planar`), `planar` is then a method like any other:
+
+    [project]
+    name = "planar"
+    version = "1.0"
 
     [project.entry-points."parapoint.methods"]
     planar = "planar:Planar"
 
 What a method may count on, and what it must keep:
 
-- A mesh is manifold, a disk, ... only if `requires` says so; a surface that is not is never handed
-  over, and its row is `skipped` with the reason. With `disk_after_cut`, closed meshes and those
-  with handles come cut to a disk, all methods with the same cut; disks with holes come as they are.
+- A mesh is manifold, oriented, connected, ... only if `requires` says so. One that is not is made
+  so, the same way for every method (`parapoint.preparation`): its components come in turn,
+  and with `disk_after_cut` closed ones and those with handles come cut to a disk, disks with holes
+  as they are. With `disk`, what is no disk is not handed over, and its row is `skipped`.
 - Vertices may be duplicate or unreferenced, triangles thin, scales any. Arrays are read-only.
 - The result has one row of `corners` for each face, in order; a row of `uv` belongs to one place
   of the surface. Scale, rotation and mirrored charts are free.
-- Every random draw comes from `seed`.
-- Only `parameterize` is timed: import libraries at the top of the file. One that need not be
-  installed is imported by `baselines.optional.optional`, so that its rows are `skipped` and say
-  what to install.
+- Every random draw comes from `seed`: the same cell gives the same map, bit by bit, on one
+  machine. A method that cannot promise it says `deterministic: ClassVar[bool] = False`.
+- Only `parameterize` is timed: import libraries at the top of the file, and what takes seconds to
+  import or start in a method `load(self)`, which is called before the clock. One that need not be
+  installed is imported by `baselines.optional.optional`, so that its rows are `skipped`, say what
+  to install, and are tried again by the next run.
 - Raise `UnsupportedError` for what the method cannot take though `requires` admits it (`skipped`);
   any other error is a `failed` row with its message.
 - `trace` may hold energies and maps on the way; `report` what should stand beside the result.

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from baselines.flattening import FlatteningError
 from parapoint.parameterization import Parameterization
-from parapoint.surface import Mesh
+from parapoint.surface import FloatArray, Mesh
 
 
 def atlas(
@@ -48,3 +48,10 @@ def atlas(
     uv[placed, 0] += page[placed] * float(page_size[0])
     report: dict[str, object] = {"unplaced_faces": int((~placed[corners]).any(axis=1).sum())}
     return Parameterization(uv, corners, report=report)
+
+
+def joined_corners(mesh: Mesh, uv: FloatArray) -> Parameterization:
+    """The map with one row for all corners that have the same vertex and the same uv (F, 3, 2)."""
+    key = np.concatenate([mesh.faces.reshape(-1, 1), uv.reshape(-1, 2)], axis=1)
+    rows, corners = np.unique(key, axis=0, return_inverse=True)
+    return Parameterization(rows[:, 1:], corners.reshape(-1, 3))

@@ -53,7 +53,7 @@ class BFF:
         defect = igl.gaussian_curvature(vertices, faces)
         defect[loop] -= np.pi
         scale = igl.min_quad_with_fixed_solve(inner, defect[:, None], zeros[loop])
-        turning = defect[loop] + (laplacian @ scale)[loop, 0]
+        turning = defect[loop] + (laplacian @ finite(scale))[loop, 0]
 
         boundary = closed_curve(arc_lengths(vertices[loop]), turning)
         u = igl.min_quad_with_fixed_solve(inner, zeros, boundary[:, :1])

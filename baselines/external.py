@@ -15,7 +15,7 @@ import numpy as np
 from baselines.flattening import FlatteningError
 from parapoint.errors import InputError
 from parapoint.files import read_parameterized
-from parapoint.method import UnsupportedError
+from parapoint.method import MissingError, UnsupportedError
 from parapoint.parameterization import Parameterization
 from parapoint.surface import Mesh, Surface
 
@@ -34,6 +34,7 @@ class External:
     command: str = ""
 
     requires: ClassVar[frozenset[str]] = frozenset({"faces"})
+    deterministic: ClassVar[bool] = False  # a program makes no promise
 
     def __post_init__(self) -> None:
         for place in ("{input}", "{output}"):
@@ -47,14 +48,15 @@ class External:
         """The map that the program wrote.
 
         Raises:
-            UnsupportedError: the surface is a point cloud, or there is no such program.
+            UnsupportedError: the surface is a point cloud.
+            MissingError: there is no such program.
             FlatteningError: the program failed, wrote no readable OBJ, or changed the faces.
         """
         if not isinstance(surface, Mesh):
             raise UnsupportedError("needs faces; the surface is a point cloud")
         words = shlex.split(self.command)
         if which(words[0]) is None:
-            raise UnsupportedError(f"needs the program {words[0]}, which is not installed")
+            raise MissingError(f"needs the program {words[0]}, which is not installed")
         with TemporaryDirectory() as folder:
             source, target = Path(folder, "input.obj"), Path(folder, "output.obj")
             write_bare_obj(source, surface)

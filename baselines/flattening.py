@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import igl
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
 from parapoint.errors import InputError
-from parapoint.method import UnsupportedError, is_planar_domain
-from parapoint.surface import FloatArray, IntArray, Mesh, Surface
+from parapoint.method import UnsupportedError
+from parapoint.surface import FloatArray, IntArray, Mesh, Surface, flat_faces
 
 
 class FlatteningError(RuntimeError):
@@ -41,16 +42,15 @@ def domain(surface: Surface) -> Domain:
     """
     if not isinstance(surface, Mesh):
         raise UnsupportedError("needs faces; the surface is a point cloud")
-    if not is_planar_domain(surface):
+    if not surface.is_planar_domain:
         raise UnsupportedError(f"needs a disk; the surface is {surface.topology}")
     vertices, faces, loop = surface.vertices, surface.faces, surface.boundary_loops[0]
     if not surface.referenced.all():
         row = np.cumsum(surface.referenced) - 1
         vertices, faces, loop = vertices[surface.referenced], row[faces], row[loop]
     along = (faces == loop[0]) & (np.roll(faces, -1, axis=1) == loop[1])
-    return Domain(
-        vertices, faces, loop if along.any() else loop[::-1], float(surface.face_areas.sum())
-    )
+    area = float(igl.doublearea(vertices, faces).sum()) / 2
+    return Domain(vertices, faces, loop if along.any() else loop[::-1], area)
 
 
 def closed_holes(disk: Domain) -> tuple[FloatArray, IntArray]:
@@ -78,11 +78,7 @@ def check_triangles(vertices: FloatArray, faces: IntArray) -> None:
     Raises:
         InputError: names the first such face and their number.
     """
-    corners = vertices[faces]
-    sides = corners - np.roll(corners, 1, axis=1)
-    longest = (sides**2).sum(axis=2).max(axis=1)
-    double_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    flat = double_area <= 8 * np.finfo(np.float64).eps * longest
+    flat = flat_faces(vertices, faces)
     if flat.any():
         raise InputError(
             f"face {int(flat.argmax())} has no area (one of {int(flat.sum())} such faces): "

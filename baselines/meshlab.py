@@ -7,6 +7,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from baselines.atlas import joined_corners
 from baselines.flattening import FlatteningError, check_triangles, domain, scaled
 from baselines.optional import optional
 from parapoint.method import UnsupportedError
@@ -93,26 +94,33 @@ class MeshLabVoronoi:
     """MeshLab's Voronoi atlas: geodesic Voronoi cells, each mapped harmonically.
 
     The filter draws its cells from a generator that cannot be seeded: a fresh process, as each cell
-    of a run is, repeats a map, a second call in one process does not.
+    of a run is, repeats a map, a second call in one process does not. It does not end where there
+    are hardly more vertices than cells, or neighbouring faces turn differently.
 
     Attributes:
-        regions: number of cells to begin with.
+        regions: number of cells to begin with, in each component.
     """
 
     regions: int = 10
 
-    requires: ClassVar[frozenset[str]] = frozenset({"faces", "manifold"})
+    requires: ClassVar[frozenset[str]] = frozenset({"faces", "oriented", "connected"})
     packages: ClassVar[tuple[str, ...]] = ("pymeshlab",)
 
     def parameterize(self, surface: Surface, *, seed: int) -> Parameterization:  # noqa: ARG002 (the filter takes no seed)
         """The atlas in the unit square.
 
         Raises:
-            UnsupportedError: the surface is a point cloud; pymeshlab is missing.
+            UnsupportedError: the surface is a point cloud or has less than two vertices a region;
+                pymeshlab is missing.
             FlatteningError: the filter failed, or left faces out.
         """
         if not isinstance(surface, Mesh):
             raise UnsupportedError("needs faces; the surface is a point cloud")
+        if len(surface.vertices) < 2 * self.regions:
+            raise UnsupportedError(
+                f"needs at least {2 * self.regions} vertices for {self.regions} regions; "
+                f"there are {len(surface.vertices)}"
+            )
         made = filtered(
             surface.vertices,
             surface.faces,
@@ -187,10 +195,3 @@ def matched_faces(mesh: Mesh, triangles: FloatArray) -> tuple[IntArray, IntArray
         raise FlatteningError(f"MeshLab's atlas left out {int(lost.sum())} of {count} faces")
     face = row[place]
     return face, (first[count:][face] - first[:count]) % 3
-
-
-def joined_corners(mesh: Mesh, uv: FloatArray) -> Parameterization:
-    """The map with one row for all corners that have the same vertex and the same uv (F, 3, 2)."""
-    key = np.concatenate([mesh.faces.reshape(-1, 1), uv.reshape(-1, 2)], axis=1)
-    rows, corners = np.unique(key, axis=0, return_inverse=True)
-    return Parameterization(rows[:, 1:], corners.reshape(-1, 3))

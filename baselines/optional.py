@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from parapoint.method import UnsupportedError
+from parapoint.method import MissingError
 
 
 class Missing:
@@ -21,13 +21,14 @@ class Missing:
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):  # looks by copy, pickle and inspect are no use of the package
             raise AttributeError(name)
-        raise UnsupportedError(self.reason)
+        raise MissingError(self.reason)
 
 
 def optional(package: str, install: str) -> Any:
     """The module `package`, or where it cannot be imported a `Missing` in its place.
 
-    Call it when the method's module is imported, so that `parameterize` does not time the import.
+    Call it when the method's module is imported, or in the method's `load` where the import takes
+    seconds, so that `parameterize` does not time it.
 
     Args:
         package: name of the module.

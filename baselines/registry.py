@@ -21,7 +21,7 @@ from types import ModuleType
 from typing import Any, Literal, Union, cast, get_args, get_origin, get_type_hints
 
 from parapoint.errors import InputError
-from parapoint.method import REQUIREMENTS, Method
+from parapoint.method import REPAIRED, REQUIREMENTS, Method
 
 METHODS: dict[str, str] = {
     "tutte": "baselines.tutte:Tutte",
@@ -31,7 +31,12 @@ METHODS: dict[str, str] = {
     "slim": "baselines.slim:SLIM",
     "bff": "baselines.bff:BFF",
     "xatlas": "baselines.xatlas_charts:Xatlas",
+    "uvatlas": "baselines.uvatlas:UVAtlas",
     "uvunwrap": "baselines.uvunwrap:UVUnwrap",
+    "blender_angle_based": "baselines.blender:BlenderAngleBased",
+    "blender_conformal": "baselines.blender:BlenderConformal",
+    "blender_minimum_stretch": "baselines.blender:BlenderMinimumStretch",
+    "blender_smart_project": "baselines.blender:BlenderSmartProject",
     "meshlab_lscm": "baselines.meshlab:MeshLabLSCM",
     "meshlab_harmonic": "baselines.meshlab:MeshLabHarmonic",
     "meshlab_voronoi": "baselines.meshlab:MeshLabVoronoi",
@@ -58,12 +63,15 @@ class Description:
         summary: first line of its docstring.
         requires: what a surface must be, words of `parapoint.method.REQUIREMENTS`, sorted.
         parameters: its fields and their defaults, as source text; "" for none.
+        deterministic: whether it promises the same map for the same seed: "yes", "no", or "by its
+            parameters".
     """
 
     name: str
     summary: str
     requires: tuple[str, ...]
     parameters: dict[str, str]
+    deterministic: str
 
 
 def names() -> list[str]:
@@ -141,7 +149,10 @@ def describe(name: str) -> Description:
             default = field.default if factory is MISSING else factory()
             parameters[field.name] = "" if default is MISSING else repr(default)
     summary = (kind.__doc__ or "").strip().split("\n", maxsplit=1)[0]
-    return Description(name, summary, tuple(sorted(kind.requires)), parameters)
+    promise = {True: "yes", False: "no"}.get(getattr(kind, "deterministic", True))
+    return Description(
+        name, summary, tuple(sorted(kind.requires)), parameters, promise or "by its parameters"
+    )
 
 
 def source_hash(made: Method) -> str:
@@ -149,11 +160,14 @@ def source_hash(made: Method) -> str:
 
     It covers the source of the method's module and of the modules of the same package that this
     one imports, directly or not, and the versions of the packages that the class names in
-    `packages`. For ParaPoint it is thus the whole of `parapoint` that it uses.
+    `packages`. For ParaPoint it is thus the whole of `parapoint` that it uses. Where the surface
+    may be changed before the method sees it, it covers how.
     """
-    module = sys.modules[type(made).__module__]
+    sources = _sources(sys.modules[type(made).__module__])
+    if made.requires & REPAIRED:
+        sources |= _sources(importlib.import_module("parapoint.preparation"))
     digest = hashlib.sha256()
-    for name, path in sorted(_sources(module).items()):
+    for name, path in sorted(sources.items()):
         text = path.read_text(encoding="utf-8").replace("\r\n", "\n")
         # A plugin file's module name holds its path, which is no part of its identity.
         digest.update(f"{name if '.' in name else path.name}\n{text}\n".encode())

@@ -73,6 +73,13 @@ def _seeds(_: click.Context, __: click.Parameter, text: str | None) -> list[int]
 @click.option("--seeds", callback=_seeds, help="Such as 0,1,2.")
 @click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Cells at once.")
 @click.option(
+    "--executor",
+    default="local",
+    show_default=True,
+    metavar="local|dask://HOST:PORT|slurm",
+    help="Where cells run: here, or on the workers of a cluster (docs/SCALE.md).",
+)
+@click.option(
     "--timeout",
     type=click.FloatRange(0, min_open=True),
     default=1800,
@@ -199,8 +206,9 @@ def score(ctx: click.Context, arguments: tuple[str, ...]) -> None:
     help="Processor time of each way in the race.",
 )
 def speed(figure: Path | None, race: str | None, seconds: float) -> None:
-    """How fast the heavy parts are, measured in this run: the metrics, and ParaPoint's training."""
+    """How fast the heavy parts are, measured now: metrics, methods, and ParaPoint's training."""
     from benchmarks.display import print_table
+    from benchmarks.method_speed import overhead_table, overheads
     from benchmarks.metric_speed import growth_figure, metric_costs, metric_table
     from benchmarks.speed import training_table
 
@@ -215,6 +223,7 @@ def speed(figure: Path | None, race: str | None, seconds: float) -> None:
     print_table(metric_table(costs))
     if figure is not None:
         growth_figure(costs, figure)
+    print_table(overhead_table(overheads()))
     print_table(training_table())
 
 

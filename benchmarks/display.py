@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 STATUSES = ("ok", "skipped", "failed", "timeout", "out_of_memory")
 BAD = STATUSES[2:]
 LISTED = 20
-"""Cells that did not end well are listed one by one up to this many."""
+"""Cells that run again, or did not end well, are listed one by one up to this many."""
 
 
 class Display(Progress):
@@ -60,10 +60,10 @@ class Display(Progress):
         """Take the bar away."""
         self._bar.stop()
 
-    def planned(self, summary: Summary, count: int) -> None:
+    def planned(self, summary: Summary) -> None:
         """Say what is going to run, and why."""
-        self._bar.update(self._task, total=count)
-        print(plan(summary, count), flush=True)
+        self._bar.update(self._task, total=len(summary.planned))
+        print(plan(summary), flush=True)
 
     def started(self, cell: Cell) -> None:
         """Show a cell as running."""
@@ -94,12 +94,20 @@ def ending(row: ResultRow) -> str:
     return f"{row.status}: {row.reason}" if row.reason else row.status
 
 
-def plan(summary: Summary, count: int) -> str:
-    """What a run is going to do, as one line."""
-    suite = summary.suite
+def plan(summary: Summary) -> str:
+    """What a run is going to do, as one line, and a line for each cell that runs once more."""
+    suite, count = summary.suite, len(summary.planned)
     why = ", ".join(f"{number} {reason}" for reason, number in summary.reasons.most_common())
     kept = f"; {len(summary.kept)} are done already" if summary.kept else ""
-    return f"{suite.name}: {count} cells to run{f' ({why})' if why else ''}{kept}"
+    lines = [f"{suite.name}: {count} cells to run{f' ({why})' if why else ''}{kept}"]
+    again = [cell for cell in summary.planned if cell.why != "new"]
+    lines += [
+        f"again: {cell.row.case}, {cell.spec}, seed {cell.row.seed}: {cell.why}"
+        for cell in again[:LISTED]
+    ]
+    if len(again) > LISTED:
+        lines.append(f"and {len(again) - LISTED} more again")
+    return "\n".join(lines)
 
 
 def print_summary(summary: Summary) -> None:

@@ -21,6 +21,7 @@ from functools import cached_property
 
 import numpy as np
 
+from parapoint.errors import InputError
 from parapoint.parameterization import Parameterization
 from parapoint.surface import BoolArray, FloatArray, IntArray, Mesh
 
@@ -28,6 +29,8 @@ SHORTEST_HEIGHT = 1e-12
 """A triangle is degenerate if its height is no more than this times its longest side ..."""
 ROUNDING = 4 * np.finfo(np.float64).eps
 """... or no more than this times the largest coordinate: then its area is but rounding error."""
+LARGEST = 1e151
+"""Larger coordinates are refused."""
 CLIPPED_RATIO = 10.0
 """Where PartUV clips the area ratio."""
 
@@ -71,9 +74,18 @@ class Triangles:
 
 
 def triangles(mesh: Mesh, parameterization: Parameterization) -> Triangles:
-    """The faces of `mesh` and their images under `parameterization`."""
+    """The faces of `mesh` and their images under `parameterization`.
+
+    Raises:
+        InputError: coordinates are so large that areas overflow.
+    """
     scale = power_of_two(mesh.vertices[mesh.faces])
     uv_scale = power_of_two(parameterization.uv[parameterization.corners])
+    for what, size in (("vertices", scale), ("uv", uv_scale)):
+        if size > LARGEST:
+            raise InputError(
+                f"coordinates of {what} above {LARGEST:g} make areas overflow: scale them down"
+            )
     # Sides (F, 2 or 3) opposite to corners 0, 1, 2.
     points = [mesh.vertices[mesh.faces[:, k]] / scale for k in range(3)]
     images = [parameterization.uv[parameterization.corners[:, k]] / uv_scale for k in range(3)]

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import datetime as dt
+import functools
+import hashlib
 import importlib.metadata
+import json
 import os
 import platform
 import re
@@ -26,7 +29,7 @@ def environment() -> dict[str, Any]:
         "python": platform.python_version(),
         "packages": _packages(),
         "platform": platform.platform(),
-        "cpu": _processor(),
+        "cpu": processor(),
         "cores": cores(),
         "memory_mb": memory() // 10**6,
         "gpu": _said_by("nvidia-smi", "--query-gpu=name", "--format=csv,noheader").splitlines(),
@@ -74,7 +77,8 @@ def _packages() -> dict[str, str]:
     return versions
 
 
-def _processor() -> str:
+@functools.cache
+def processor() -> str:
     """Name of the processor."""
     try:
         for line in Path("/proc/cpuinfo").read_text().splitlines():
@@ -83,6 +87,19 @@ def _processor() -> str:
     except OSError:
         pass
     return platform.processor() or platform.machine()
+
+
+@functools.cache
+def project() -> str:
+    """Hash of the project's source and of the versions of the packages that it asks for.
+
+    Where it is the same, so is what comes of a cell or of a map's metrics.
+    """
+    digest = hashlib.sha256(json.dumps(_packages(), sort_keys=True).encode())
+    for package in ("parapoint", "baselines", "benchmarks"):
+        for path in sorted((ROOT / package).glob("*.py")):
+            digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def _said_by(*command: str) -> str:

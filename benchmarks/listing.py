@@ -58,15 +58,16 @@ def methods() -> Table:
     """Each method with what it requires and its parameters."""
     from baselines import registry
 
-    table = _table("method", "requires", "parameters", "summary")
+    table = _table("method", "requires", "deterministic", "parameters", "summary")
     for name in registry.names():
         try:
             about = registry.describe(name)
         except (ImportError, InputError) as error:
-            _add(table, name, "", "", f"cannot be imported: {error}")
+            _add(table, name, "", "", "", f"cannot be imported: {error}")
             continue
         parameters = ", ".join(f"{key}={value}" for key, value in about.parameters.items())
-        _add(table, name, ", ".join(about.requires), parameters, about.summary)
+        requires = ", ".join(about.requires)
+        _add(table, name, requires, about.deterministic, parameters, about.summary)
     return table
 
 

@@ -171,12 +171,12 @@ def change(old: str, new: str, relative: float, absolute: float) -> float:
 
 def measured(suite: Suite) -> dict[str, Rows]:
     """Values of all cells of a suite by method spec; cases whose model is missing are left out."""
-    from benchmarks import runner
+    from benchmarks import environment, runner
     from benchmarks.display import Display, print_summary
     from benchmarks.results import Store
 
     with Display() as progress:
-        summary = runner.run(suite, RESULTS, progress=progress)
+        summary = runner.run(suite, RESULTS, progress=progress, jobs=min(environment.cores(), 8))
     print_summary(summary)
     frame = Store(RESULTS).metrics().set_index("id")
     found: dict[str, Rows] = {spec: {} for spec in suite.methods}

@@ -19,6 +19,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import errno
+import functools
 import hashlib
 import inspect
 import io
@@ -31,7 +32,7 @@ import sys
 import typing
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
@@ -57,6 +58,8 @@ IDENTITY_COLUMNS = ("suite", "case", "method", "params", "seed", "status")
 _NAME = re.compile(r"[0-9a-f]{8,64}")
 SOURCE_CHANGED = "the source of the method changed during the run; run again"
 """Reason of a row that the next run does anew whatever its hash says."""
+MISSING = "not installed: "
+"""Begins the reason of a row that lacked a package or program: the next run tries it again."""
 _DAMAGE = (
     *(OSError, EOFError, ValueError, TypeError, AttributeError, KeyError, MemoryError),
     *(NotImplementedError, zipfile.BadZipFile, zlib.error),
@@ -90,6 +93,7 @@ class ResultRow:
         uv_sha256: `arrays_hash` of the map: the same map has the same hash, whatever its trace.
         report: what the method wrote beside its result (energies, iterations, weights).
         run: entry of `environment()["runs"]` in which the cell ran.
+        host: name and processor of the worker that ran it; "" where that was the run's own machine.
     """
 
     id: str
@@ -111,6 +115,7 @@ class ResultRow:
     uv_sha256: str = ""
     report: Mapping[str, object] = field(default_factory=dict)
     run: int = 0
+    host: str = ""
 
     @property
     def cell(self) -> str:
@@ -225,7 +230,7 @@ def write_arrays(path: Path, arrays: Arrays) -> None:
         else array
         for name, array in arrays.items()
     }
-    with _replacing(path) as stream:
+    with replacing(path) as stream:
         np.savez_compressed(stream, allow_pickle=False, **small)
 
 
@@ -250,7 +255,7 @@ def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
 
 
 @contextlib.contextmanager
-def _replacing(path: Path) -> Iterator[typing.IO[bytes]]:
+def replacing(path: Path) -> Iterator[typing.IO[bytes]]:
     """A stream whose content becomes the file `path`, in one step, when the block ends well."""
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
@@ -284,14 +289,14 @@ def _write_whole(stream: int, line: bytes) -> None:
 
 @contextlib.contextmanager
 def disk_said(path: Path) -> Iterator[None]:
-    """Says a full disk in one clear line."""
+    """Says a full disk, or a limit on files that is reached, in one clear line."""
     try:
         yield
     except OSError as error:
-        if error.errno in {errno.ENOSPC, errno.EDQUOT}:
+        if error.errno in {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}:
             raise InputError(
-                f"{path}: no space left on the disk; earlier results are intact: make room and "
-                "run the same command again"
+                f"{path}: {os.strerror(error.errno).lower()}; earlier results are intact: make "
+                "room and run the same command again"
             ) from None
         raise
 
@@ -307,7 +312,7 @@ def _row(line: bytes) -> ResultRow | None:
         return None
     if row.surface_hash and not _NAME.fullmatch(row.surface_hash):
         return None
-    texts = (row.suite, row.case, row.method, row.source_hash, row.reason, row.uv_sha256)
+    texts = (row.suite, row.case, row.method, row.source_hash, row.reason, row.uv_sha256, row.host)
     typed = (
         all(isinstance(text, str) for text in texts)
         and row.status in typing.get_args(Status)
@@ -419,13 +424,10 @@ class Store:
 
     def unmeasured(self) -> list[ResultRow]:
         """The rows with a map whose metrics are not in `metrics.parquet`, or of an older source."""
-        known = self._known_metrics()
-        source = _metrics_source()
-        return [
-            row
-            for row in self.rows()
-            if row.uv_sha256 and self._metrics_key(row, source) not in known
-        ]
+        frame = self._metrics_table()
+        known = set() if frame is None else set(frame["metrics_key"])
+        keys = self._metrics_keys(rows := self.rows())
+        return [row for row in rows if row.uv_sha256 and keys[row.id] not in known]
 
     def metrics(self, measured: Mapping[str, Mapping[str, float]] | None = None) -> pd.DataFrame:
         """One row a cell: suite, case, method, params, seed, status, every metric by name, id.
@@ -439,18 +441,19 @@ class Store:
         import pandas as pd
 
         names = _metric_names()
-        known = self._known_metrics()
-        source = _metrics_source()
+        table = self._metrics_table()
+        keys = self._metrics_keys(rows := self.rows())
+        if table is not None and table["metrics_key"].tolist() == [keys[row.id] for row in rows]:
+            return table
+        known = _by_key(table)
         records: list[dict[str, object]] = []
-        added = False
-        for row in self.rows():
-            key = self._metrics_key(row, source)
+        for row in rows:
+            key = keys[row.id]
             if key in known:
                 values = known[key]
             else:
                 given = (measured or {}).get(row.id)
                 values = self._measured(row) if given is None else dict(given)
-                added = True
             cell = (row.suite, row.case, row.method, json.dumps(row.params), row.seed, row.status)
             start = dict(zip(IDENTITY_COLUMNS, cell, strict=True))
             records.append({**start, **values, "id": row.id, "metrics_key": key})
@@ -460,8 +463,7 @@ class Store:
         columns = [*IDENTITY_COLUMNS, *numbers, "id", "metrics_key"]
         frame = pd.DataFrame.from_records(records, columns=columns)
         frame = frame.astype(dict.fromkeys(numbers, "float64") | {"seed": "int64"})
-        if added or len(known) != len(records):
-            self._write_metrics(frame)
+        self._write_metrics(frame)
         return frame
 
     def _write_metrics(self, frame: pd.DataFrame) -> None:
@@ -469,7 +471,7 @@ class Store:
         path = self.folder / "metrics.parquet"
         content = io.BytesIO()
         frame.to_parquet(content, index=False)
-        with contextlib.suppress(PermissionError), disk_said(path), _replacing(path) as stream:
+        with contextlib.suppress(PermissionError), disk_said(path), replacing(path) as stream:
             stream.write(content.getbuffer())
 
     def faults(self, sample: int = 20) -> Iterator[str]:
@@ -519,9 +521,8 @@ class Store:
 
     def _metric_faults(self, rows: list[ResultRow], sample: int) -> Iterator[str]:
         """Where `metrics.parquet` differs from what `sample` of the maps give."""
-        known = self._known_metrics()
-        source = _metrics_source()
-        keys = {row.id: self._metrics_key(row, source) for row in rows}
+        known = _by_key(self._metrics_table())
+        keys = self._metrics_keys(rows)
         measured = [row for row in rows if row.status == "ok" and keys[row.id] in known]
         for row in measured[:: max(1, len(measured) // sample)][:sample]:
             stored = known[keys[row.id]]
@@ -534,27 +535,36 @@ class Store:
                         f"{stored.get(name)} in metrics.parquet, {value} from the map"
                     )
 
-    def _known_metrics(self) -> dict[str, dict[str, float]]:
-        """The values in `metrics.parquet` by their key; none where it is missing or damaged."""
+    def _metrics_table(self) -> pd.DataFrame | None:
+        """What is in `metrics.parquet`; None where it is missing or damaged."""
         import pandas as pd
         import pyarrow as pa
 
         path = self.folder / "metrics.parquet"
         try:
             frame = pd.read_parquet(path)
-            values = frame.drop(columns=[*IDENTITY_COLUMNS, "id"]).set_index("metrics_key")
         except FileNotFoundError:
-            return {}
+            return None
         except (OSError, ValueError, KeyError, pa.ArrowException):
+            frame = pd.DataFrame()
+        columns = list(frame.columns)
+        numbers = columns[len(IDENTITY_COLUMNS) : -2]
+        whole = columns == [*IDENTITY_COLUMNS, *numbers, "id", "metrics_key"]
+        whole = whole and frame["metrics_key"].is_unique
+        if not whole or set(map(str, frame[numbers].dtypes)) - {"float64"}:
             _log.warning("%s: damaged; computed anew", path)
-            return {}
-        return {str(key): record for key, record in values.to_dict("index").items()}  # type: ignore[misc]
+            return None
+        return frame
 
-    def _metrics_key(self, row: ResultRow, source: str) -> str:
-        """What the metrics of a row depend on, as a hash: its map, any reference, their source."""
-        reference = bool(row.surface_hash) and self.reference_path(row.surface_hash).exists()
-        text = f"{row.id} {row.uv_sha256} {reference} {source}"
-        return hashlib.sha256(text.encode()).hexdigest()[:32]
+    def _metrics_keys(self, rows: Sequence[ResultRow]) -> dict[str, str]:
+        """What the metrics of each row depend on, by its id: map, any reference, their source."""
+        source = _metrics_source()
+        references = {path.stem for path in (self.folder / "references").glob("*.npz")}
+        texts = {
+            row.id: f"{row.id} {row.uv_sha256} {row.surface_hash in references} {source}"
+            for row in rows
+        }
+        return {key: hashlib.sha256(text.encode()).hexdigest()[:32] for key, text in texts.items()}
 
     def _measured(self, row: ResultRow) -> dict[str, float]:
         """Every metric of a row's map; none where it has no map or its files are damaged."""
@@ -687,7 +697,7 @@ class Store:
     def note_surfaces(self, hashes: Mapping[str, str]) -> None:
         """Keep what `surface_hashes` is to return: a later run need not read those models."""
         path = self.folder / "surfaces.json"
-        with disk_said(path), _replacing(path) as stream:
+        with disk_said(path), replacing(path) as stream:
             stream.write(json.dumps(hashes, indent=1).encode() + b"\n")
 
     def add_map(self, row_id: str, path: Path) -> None:
@@ -703,7 +713,7 @@ class Store:
         content = self.environment()
         content["runs"].append(plain(entry))
         path = self.folder / "environment.json"
-        with disk_said(path), _replacing(path) as stream:
+        with disk_said(path), replacing(path) as stream:
             stream.write(json.dumps(content, indent=1).encode() + b"\n")
         return len(content["runs"]) - 1
 
@@ -760,6 +770,14 @@ def measured(
     raise InputError("a map of a mesh for a point cloud, or the other way round")
 
 
+def _by_key(table: pd.DataFrame | None) -> dict[str, dict[str, float]]:
+    """The values of a metrics table by their key."""
+    if table is None:
+        return {}
+    values = table.drop(columns=[*IDENTITY_COLUMNS, "id"]).set_index("metrics_key")
+    return {str(key): record for key, record in values.to_dict("index").items()}  # type: ignore[misc]
+
+
 def _metric_names() -> list[str]:
     """Names of all metrics in the order of the registry."""
     from benchmarks.metrics import METRICS
@@ -767,6 +785,7 @@ def _metric_names() -> list[str]:
     return list(METRICS)
 
 
+@functools.cache
 def _metrics_source() -> str:
     """Hash of the source that the metrics are computed with: their modules of this project."""
     from benchmarks import metrics

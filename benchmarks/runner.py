@@ -1,59 +1,36 @@
 """Runs the cells of a suite that a results folder does not have yet, each in its own process.
 
-This process plans, hands cells to supervisors (`benchmarks.worker`), and alone writes rows. All of
-it may be killed at any time: what has a row is kept, and the same call goes on from there.
+This process plans, hands cells to an executor (`benchmarks.executors`), and alone writes rows. All
+of it may be killed at any time: what has a row is kept, and the same call goes on from there.
 """
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import hashlib
-import json
-import math
-import os
-import selectors
-import shutil
-import subprocess
-import sys
-import tempfile
 import time
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self, cast
-
-import psutil
+from typing import Any, cast
 
 from baselines import registry
-from benchmarks import environment, models
-from benchmarks.results import SOURCE_CHANGED, ResultRow, Store, disk_said, identity, plain
+from benchmarks import environment, executors, models
+from benchmarks.builtin import BUILTIN
+from benchmarks.executors import WORKER_LOST, Executor, Task
+from benchmarks.results import MISSING, SOURCE_CHANGED, ResultRow, Store, identity, plain
 from benchmarks.suites import Suite
 from parapoint import files
 from parapoint.errors import InputError
-from parapoint.files import read_parameterized
-from parapoint.surface import Surface
+from parapoint.files import faults_of, read_parameterized
 
 TIME_LIMIT = 1800.0
 """Seconds a cell may take unless said otherwise."""
 METRICS_TIME_LIMIT = 120.0
 """Seconds that the metrics of one map may take; on real maps of 100k faces they take a few."""
-GRACE = 15.0
-"""Seconds past its limit after which a supervisor itself counts as hung."""
-OUTPUT_KEPT = 1 << 16
-"""Bytes of a method's output that are held; what came before is dropped."""
 READERS = ("files", "mesh_formats", "point_formats", "surface")
 """Modules of `parapoint` that make a surface of a file."""
-THREAD_VARIABLES = (
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "NUMEXPR_NUM_THREADS",
-    "VECLIB_MAXIMUM_THREADS",
-    "IGL_NUM_THREADS",
-)
 
 
 @dataclass(frozen=True)
@@ -88,8 +65,8 @@ class Summary:
     Attributes:
         suite: the suite, with the cases, methods and seeds that were asked for.
         methods: its methods.
+        planned: the cells that had to run.
         ran: rows of the cells that ran, in the order in which they ended.
-        reasons: how many cells ran for which reason.
         kept: rows of the cells that needed no run.
         missing: the cases whose model could not be had, and how to get each.
         unmeasured: ids of the rows whose metrics could not be computed, and why.
@@ -99,8 +76,8 @@ class Summary:
 
     suite: Suite
     methods: Sequence[Chosen]
+    planned: list[Cell] = field(default_factory=list)
     ran: list[ResultRow] = field(default_factory=list)
-    reasons: Counter[str] = field(default_factory=Counter)
     kept: list[ResultRow] = field(default_factory=list)
     missing: dict[str, str] = field(default_factory=dict)
     unmeasured: dict[str, str] = field(default_factory=dict)
@@ -119,6 +96,11 @@ class Summary:
         )
 
     @property
+    def reasons(self) -> Counter[str]:
+        """How many cells had to run for which reason."""
+        return Counter(cell.why for cell in self.planned)
+
+    @property
     def rows(self) -> list[ResultRow]:
         """Rows of all cells of the run, kept or new."""
         return [*self.kept, *self.ran]
@@ -127,8 +109,8 @@ class Summary:
 class Progress:
     """Hears how a run goes; this one says nothing."""
 
-    def planned(self, summary: Summary, count: int) -> None:
-        """`count` cells are going to run."""
+    def planned(self, summary: Summary) -> None:
+        """It is known what is going to run."""
 
     def started(self, cell: Cell) -> None:
         """A cell begins."""
@@ -151,6 +133,7 @@ def run(
     cases: Sequence[str] | None = None,
     seeds: Sequence[int] | None = None,
     plugins: Sequence[str] = (),
+    executor: str = "local",
     jobs: int = 1,
     timeout: float = TIME_LIMIT,
     memory: float | None = None,
@@ -165,31 +148,38 @@ def run(
         cases: names of models or paths of files.
         seeds: seeds, each a run of every method.
         plugins: "FILE.py:Class" of methods to add, which run as well.
+        executor: where cells run, as `executors.executor` says.
         jobs: cells at a time. More than one is faster and makes timings less honest.
         timeout: seconds a cell may take.
-        memory: GB a cell's processes may hold; None: four fifths of the machine's, / jobs.
+        memory: GB a cell's processes may hold; None: four fifths of the machine's, / jobs. An
+            executor other than local must be told.
         progress: hears how it goes.
 
     Raises:
         InputError: a name is unknown, a file cannot be read, the folder is in use or from a newer
-            version, the disk is full. In the first two cases nothing is written.
+            version, the disk is full, an executor cannot be had. In the first two cases nothing
+            is written.
     """
     began = time.monotonic()
     progress = progress or Progress()
     suite, chosen = _choice(suite, methods, cases, seeds, plugins)
     store = Store(folder)
-    loaded = _loaded(cases or ())
+    hands = executors.executor(
+        executor, store.folder / "cells", jobs=jobs, memory=memory, tick=progress.tick
+    )
+    _check_readable(cases or (), store)
     limits = {
         "time_limit": timeout,
         "memory_limit": memory * 1e9 if memory else 0.8 * environment.memory() / jobs,
     }
-    threads = environment.threads(jobs)
     summary = Summary(suite, chosen)
-    with store.writing(), _Pool(store.folder / "cells", threads, progress) as pool:
-        surfaces = _surfaces(store, suite.cases, loaded, summary)
-        here = environment.environment() | limits | {"jobs": jobs, "threads": threads}
-        todo = list(_todo(suite, chosen, surfaces, store=store, here=here, summary=summary))
-        progress.planned(summary, len(todo))
+    with store.writing(), hands:
+        surfaces = _surfaces(store, suite.cases, summary)
+        here = environment.environment() | limits
+        here |= {"executor": executor, "jobs": jobs, "threads": hands.threads}
+        todo = summary.planned
+        todo += _todo(suite, chosen, surfaces, store=store, here=here, summary=summary)
+        progress.planned(summary)
         if todo:
             number = store.add_run(here | {"suite": suite.name})
             book = _Book(store, number, summary, progress)
@@ -200,22 +190,25 @@ def run(
                     book.write(
                         cell, {"status": "skipped", "reason": summary.missing[cell.row.case]}
                     )
-            pool.run(tasks, jobs)
-        _measure(store, pool, summary, progress)
+            hands.run(tasks, jobs)
+        _measure(store, hands, None if executor == "local" else memory, summary, progress)
     summary.seconds = time.monotonic() - began
     summary.method_seconds /= jobs
     return summary
 
 
-def _measure(store: Store, pool: _Pool, summary: Summary, progress: Progress) -> None:
+def _measure(
+    store: Store, hands: Executor, memory: float | None, summary: Summary, progress: Progress
+) -> None:
     """Bring the metrics up to date, each map in a child process: a wild map can defeat a metric."""
     rows = store.unmeasured()
     values: dict[str, dict[str, float]] = {}
     # Another supervisor takes a second to start: it must have something to do.
-    jobs = min(environment.cores(), 1 + len(rows) // 4)
+    jobs = min(hands.width, 1 + len(rows) // 4)
     limits = {
+        "measure": True,
         "time_limit": METRICS_TIME_LIMIT,
-        "memory_limit": 0.8 * environment.memory() / jobs,
+        "memory_limit": memory * 1e9 if memory else 0.8 * environment.memory() / jobs,
     }
 
     def ended(row: ResultRow) -> Callable[[dict[str, Any], str, Path], None]:
@@ -233,13 +226,11 @@ def _measure(store: Store, pool: _Pool, summary: Summary, progress: Progress) ->
     tasks = []
     for row in rows:
         reference = store.reference_path(row.surface_hash)
-        files = {
-            "surface": str(store.surface_path(row.surface_hash).resolve()),
-            "measure": str(store.uv_path(row.id).resolve()),
-            "reference": str(reference.resolve()) if reference.exists() else "",
-        }
-        tasks.append(_Task(limits | files, began, ended(row)))
-    pool.run(tasks, jobs)
+        inputs = {"surface": store.surface_path(row.surface_hash), "uv": store.uv_path(row.id)}
+        if reference.exists():
+            inputs["reference"] = reference
+        tasks.append(Task(limits, inputs, began, ended(row)))
+    hands.run(tasks, jobs)
     store.metrics(values)
 
 
@@ -272,59 +263,65 @@ def _choice(
     return dataclasses.replace(suite, cases=names, methods=specs, seeds=asked_seeds), chosen
 
 
-def _loaded(cases: Sequence[str]) -> dict[str, Surface | InputError]:
-    """The surfaces that were asked for by name, read before anything is written.
+def _check_readable(cases: Sequence[str], store: Store) -> None:
+    """Read what was asked for by name before anything is written, and keep none of it in memory.
 
     Raises:
         InputError: a file cannot be read, or every model is missing.
     """
-    loaded: dict[str, Surface | InputError] = {}
+    known, readers = store.surface_hashes(), _readers_hash()
+    missing = []
     for case in cases:
         try:
-            loaded[models.canonical_name(case)] = models.load(case)
+            if _origin(case, readers) not in known:
+                models.load(case)
         except models.MissingModelError as error:
-            loaded[models.canonical_name(case)] = error
-    missing = [error for error in loaded.values() if isinstance(error, InputError)]
-    if missing and len(missing) == len(loaded):
+            missing.append(error)
+    if missing and len(missing) == len(cases):
         raise missing[0]
-    return loaded
 
 
-def _surfaces(
-    store: Store,
-    cases: Sequence[str],
-    loaded: Mapping[str, Surface | InputError],
-    summary: Summary,
-) -> dict[str, str]:
+def _surfaces(store: Store, cases: Sequence[str], summary: Summary) -> dict[str, str]:
     """The hash of each case's surface, stored; "" where the model is missing."""
     hashes = {}
-    known = store.surface_hashes()
-    readers = _readers_hash()
+    known, readers = store.surface_hashes(), _readers_hash()
     before = dict(known)
     for case in cases:
-        model = models.info(case)
-        origin = f"{model.sha256} {readers}" if model else ""
-        surface = loaded.get(case)
-        if surface is None and origin in known:
+        origin = _origin(case, readers)
+        if origin in known:
             hashes[case] = known[origin]
             continue
-        if surface is None:
-            try:
-                surface = models.load(case)
-            except InputError as error:
-                surface = error
-        if isinstance(surface, InputError):
-            summary.missing[case] = " ".join(str(surface).split())
+        try:
+            surface = models.load(case)
+        except InputError as error:
+            summary.missing[case] = " ".join(str(error).split())
             hashes[case] = ""
             continue
         hashes[case] = store.add_surface(surface)
+        model = models.info(case)
         if model and model.has_uv:
             store.add_reference(hashes[case], read_parameterized(models.path(case))[1])
-        if model:
+        if origin:
             known[origin] = hashes[case]
     if known != before:
         store.note_surfaces(known)
     return hashes
+
+
+def _origin(case: str, readers: str) -> str:
+    """The content of a case's file and the hash of its readers, as one text; "" for what varies.
+
+    Built-in surfaces have no file, and a .gltf file names others.
+    """
+    model = models.info(case)
+    path = Path(case)
+    if model:
+        return f"{model.sha256} {readers}"
+    if models.canonical_name(case) in BUILTIN or path.suffix.lower() == ".gltf":
+        return ""
+    with faults_of(path), path.open("rb") as stream:
+        content = hashlib.file_digest(stream, "sha256").hexdigest()
+    return f"{content} {path.suffix.lower()} {readers}"
 
 
 def _readers_hash() -> str:
@@ -357,7 +354,6 @@ def _todo(
                 row = rows.get(blank.cell)
                 why = "new" if row is None else _changed(blank, row, store, runs, here)
                 if why:
-                    summary.reasons[why] += 1
                     yield Cell(blank, method.spec, why)
                 elif row is not None:
                     summary.kept.append(row)
@@ -403,224 +399,19 @@ def _changed(
         return "model changed" if row.surface_hash else "model was missing"
     if row.reason == SOURCE_CHANGED:
         return "method changed"
+    if row.reason == WORKER_LOST:
+        return "workers were lost"
     if row.status == "ok":
         return "" if store.uv_path(row.id).exists() else "map missing"
     there = runs[row.run] if 0 <= row.run < len(runs) else {}
     if any(there.get(name) != here[name] for name in environment.MACHINE):
         return f"{row.status} in another environment"
+    if row.reason.startswith(MISSING):
+        return "may be installed now"
     limit = {"timeout": "time_limit", "out_of_memory": "memory_limit"}.get(row.status)
     if limit and here[limit] > there.get(limit, 0) * 1.01:  # the machine's own total may vary
         return "limit raised"
     return ""
-
-
-@dataclass(frozen=True)
-class _Task:
-    """Something for a supervisor to do.
-
-    Attributes:
-        job: what the supervisor is told, its limits included.
-        began: called when it is under way.
-        ended: called with its outcome, the last lines printed and the file it may have written.
-    """
-
-    job: Mapping[str, Any]
-    began: Callable[[], None]
-    ended: Callable[[dict[str, Any], str, Path], None]
-
-
-class _Slot:
-    """A supervisor process, and the task that it is busy with."""
-
-    def __init__(self, threads: int) -> None:
-        """Start a supervisor whose children may use `threads` threads."""
-        self.replies, send = os.pipe()
-        variables = dict.fromkeys(THREAD_VARIABLES, str(threads)) | {"PYTHONHASHSEED": "0"}
-        self.process = subprocess.Popen(  # noqa: S603  our own module
-            [sys.executable, "-m", "benchmarks.worker", str(send)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            pass_fds=[send],
-            start_new_session=True,
-            cwd=environment.ROOT,
-            env=os.environ | variables,
-            bufsize=0,
-        )
-        os.close(send)
-        assert self.process.stdin is not None
-        assert self.process.stdout is not None
-        self.jobs = self.process.stdin
-        self.output = self.process.stdout.fileno()
-        os.set_blocking(self.output, False)
-        os.set_blocking(self.replies, False)
-        self.reply = bytearray()
-        self.printed = bytearray()
-        self.ready = False
-        self.task: _Task | None = None
-        self.folder = Path()
-        self.started = 0.0
-
-    @property
-    def time_limit(self) -> float:
-        """Seconds that the task may take."""
-        return float(self.task.job["time_limit"]) if self.task else math.inf
-
-    def give(self, task: _Task, folder: Path) -> None:
-        """Begin a task, which may write into `folder`."""
-        self.printed.clear()
-        self.task = task
-        self.folder = folder
-        self.started = time.monotonic()
-        job = {**task.job, "map": str(folder / "map.npz"), "work": str(folder / "work")}
-        with contextlib.suppress(OSError):  # a supervisor that is gone is heard of next
-            self.jobs.write(json.dumps(job).encode() + b"\n")
-
-    def hear(self) -> list[dict[str, Any]] | None:
-        """Outcomes that have come in; None once the supervisor is gone."""
-        content = _available(self.replies)
-        if content is None:
-            return None
-        *lines, self.reply = (self.reply + content).split(b"\n")
-        return [json.loads(line) for line in lines]
-
-    def drain(self) -> None:
-        """Take in what was printed, so that no method waits for a reader; keep the end of it."""
-        self.printed += _available(self.output) or b""
-        del self.printed[:-OUTPUT_KEPT]
-
-    def close(self) -> None:
-        """End the supervisor and with it all that runs below it."""
-        with contextlib.suppress(OSError):
-            self.jobs.close()
-        try:
-            self.process.wait(GRACE / 3)
-        except subprocess.TimeoutExpired:
-            with contextlib.suppress(psutil.Error):
-                for process in psutil.Process(self.process.pid).children(recursive=True):
-                    with contextlib.suppress(psutil.Error):
-                        process.kill()
-            self.process.kill()
-            self.process.wait()
-        assert self.process.stdout is not None
-        self.process.stdout.close()
-        os.close(self.replies)
-
-
-def _available(pipe: int) -> bytes | None:
-    """What can be read from `pipe` at once, one megabyte or so at most; None at its end."""
-    content = bytearray()
-    while len(content) < 1 << 20:
-        try:
-            chunk = os.read(pipe, 1 << 16)
-        except BlockingIOError:
-            break
-        if not chunk:
-            return bytes(content) or None
-        content += chunk
-    return bytes(content)
-
-
-class _Pool:
-    """Supervisors that work off tasks. A context manager: after it, no process is left."""
-
-    def __init__(self, folder: Path, threads: int, progress: Progress) -> None:
-        """Tasks write into folders below `folder`, which goes with the pool."""
-        self.folder = folder
-        self.threads = threads
-        self.progress = progress
-        self.selector = selectors.DefaultSelector()
-        self.slots: set[_Slot] = set()
-
-    def __enter__(self) -> Self:
-        """Clear what a run that was killed has left."""
-        shutil.rmtree(self.folder, ignore_errors=True)
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """End all supervisors and what runs below them."""
-        for slot in self.slots:
-            slot.close()
-        self.selector.close()
-        shutil.rmtree(self.folder, ignore_errors=True)
-
-    def run(self, tasks: Sequence[_Task], jobs: int) -> None:
-        """Do all tasks, `jobs` at a time."""
-        waiting = deque(tasks)
-        jobs = min(jobs, len(tasks))
-        while waiting or self._busy():
-            while len(self.slots) < jobs:
-                self._open()
-            for slot in self.slots:
-                if waiting and slot.ready and not slot.task and self._busy() < jobs:
-                    self._begin(slot, waiting.popleft())
-            self._listen()
-            self.progress.tick()
-
-    def _busy(self) -> int:
-        return sum(slot.task is not None for slot in self.slots)
-
-    def _open(self) -> None:
-        slot = _Slot(self.threads)
-        self.slots.add(slot)
-        self.selector.register(slot.replies, selectors.EVENT_READ, slot)
-        self.selector.register(slot.output, selectors.EVENT_READ, slot)
-
-    def _begin(self, slot: _Slot, task: _Task) -> None:
-        with disk_said(self.folder):
-            self.folder.mkdir(exist_ok=True)
-            folder = Path(tempfile.mkdtemp(dir=self.folder)).resolve()
-            (folder / "work").mkdir()
-        slot.give(task, folder)
-        task.began()
-
-    def _listen(self) -> None:
-        """Wait a moment for news, and deal with it."""
-        for slot in {key.data for key, _ in self.selector.select(0.1)}:
-            news = slot.hear()
-            slot.drain()
-            for outcome in news or ():
-                slot.ready = True
-                if slot.task is not None:
-                    self._end(slot, outcome)
-            if news is None:
-                self._lost(slot)
-        now = time.monotonic()
-        for slot in [slot for slot in self.slots if now > slot.started + slot.time_limit + GRACE]:
-            self._lost(slot)
-
-    def _lost(self, slot: _Slot) -> None:
-        """Deal with a supervisor that is gone or hangs: its task ends with it."""
-        if slot.task is None:
-            said = last_lines(slot.printed, lines=1)
-            raise RuntimeError(f"benchmarks.worker ended unasked: {said}")
-        if time.monotonic() > slot.started + slot.time_limit:
-            reason = f"not done within the limit of {slot.time_limit:g} s, and hard to kill"
-            self._end(slot, {"status": "timeout", "reason": reason})
-        else:
-            reason = "killed the process that watched over it"
-            self._end(slot, {"status": "failed", "reason": reason})
-        self.slots.discard(slot)
-        self.selector.unregister(slot.replies)
-        self.selector.unregister(slot.output)
-        slot.close()
-
-    def _end(self, slot: _Slot, outcome: dict[str, Any]) -> None:
-        task = slot.task
-        assert task is not None
-        slot.task = None
-        if outcome["status"] == "stop":
-            raise InputError(
-                f"{outcome['reason']}; earlier results are intact: mend that and run again"
-            )
-        outcome["took"] = time.monotonic() - slot.started
-        task.ended(outcome, last_lines(slot.printed), slot.folder / "map.npz")
-        shutil.rmtree(slot.folder, ignore_errors=True)
 
 
 class _Book:
@@ -633,14 +424,13 @@ class _Book:
         self.summary = summary
         self.progress = progress
 
-    def task(self, cell: Cell, shared: Mapping[str, Any]) -> _Task:
+    def task(self, cell: Cell, shared: Mapping[str, Any]) -> Task:
         """What runs a cell and writes its row; `shared` holds the limits and plugins of all."""
         job = {
             **shared,
             "spec": cell.spec,
             "seed": cell.row.seed,
             "source_hash": cell.row.source_hash,
-            "surface": str(self.store.surface_path(cell.row.surface_hash).resolve()),
         }
 
         def ended(outcome: dict[str, Any], printed: str, path: Path) -> None:
@@ -653,7 +443,8 @@ class _Book:
                 outcome["output"] = printed
             self.write(cell, outcome)
 
-        return _Task(job, lambda: self.progress.started(cell), ended)
+        inputs = {"surface": self.store.surface_path(cell.row.surface_hash)}
+        return Task(job, inputs, lambda: self.progress.started(cell), ended)
 
     def write(self, cell: Cell, outcome: Mapping[str, Any]) -> None:
         """Write the row of `cell`."""
@@ -661,9 +452,3 @@ class _Book:
         self.store.append(row)
         self.summary.ran.append(row)
         self.progress.ended(cell, row)
-
-
-def last_lines(printed: bytes | bytearray, lines: int = 20, characters: int = 4000) -> str:
-    """The end of what a method printed."""
-    text = printed.decode(errors="replace")[-characters:]
-    return "\n".join(text.splitlines()[-lines:])

@@ -79,8 +79,9 @@ def map_state(file: Path, reference: Path | None = None) -> MapState:
     """
     mesh, parameterization = read_parameterized(file)
     state = MapState(mesh, parameterization)
-    if not (np.abs(state.triangles.uv_area) > 0).any():
-        raise InputError(f"{file}: every face has zero UV area; there is no map to score")
+    with faults_of(file):
+        if not (np.abs(state.triangles.uv_area) > 0).any():
+            raise InputError("every face has zero UV area; there is no map to score")
     if reference is None:
         return state
     other_mesh, other = read_parameterized(reference)

@@ -1,8 +1,8 @@
 """Validity of a map: flipped, degenerate and overlapping faces.
 
 A chart is turned over as a whole without harm (a mirrored chart has no flip), so a face is flipped
-if its orientation differs from the majority of its own chart, by 3D area. Orientation is that of
-the corners as stored: where the mesh's own faces are not consistently oriented, the odd ones count.
+if its orientation differs from the majority of its own chart, by 3D area. Where the mesh's own
+faces do not turn alike, which is no fault of a map, those of a chart are first made to.
 """
 
 from __future__ import annotations
@@ -10,12 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+import igl
 import numpy as np
 
 from benchmarks.distortion import Triangles
 from benchmarks.overlap import Overlaps, overlaps
 from parapoint.parameterization import Parameterization
-from parapoint.surface import BoolArray
+from parapoint.surface import BoolArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,14 +33,30 @@ class Validity:
 
     @cached_property
     def flipped(self) -> BoolArray:
-        """(F,) whether a face is turned against the majority of its chart, by 3D area.
+        """(F,) whether a face is folded against the majority of its chart, by 3D area.
 
         Faces without UV area have no orientation and are not flipped. In a tie the
         counter-clockwise faces are the majority.
         """
-        sign, chart = self.triangles.sign, self.parameterization.charts()
+        sign, chart = self.triangles.sign * self.turn, self.parameterization.charts()
         balance = np.bincount(chart, sign * self.triangles.area)
         return np.asarray(sign * np.where(balance < 0, -1, 1)[chart] < 0)
+
+    @property
+    def turn(self) -> IntArray:
+        """(F,) -1 for faces to be turned so that across inner edges of a chart faces turn alike.
+
+        1 for all others, and for all faces of a map that are so already.
+        """
+        image, corners = self.parameterization, self.parameterization.corners
+        forward = (corners < np.roll(corners, -1, axis=1)).reshape(-1)
+        alike = np.bincount(image.edge_of_halfedge, forward) == 1
+        turn = np.ones(len(corners), dtype=np.int64)
+        if not alike[image.edge_face_count == 2].all():
+            faces = np.flatnonzero(self.triangles.sign)  # others may name a row twice
+            turned, _ = igl.bfs_orient(corners[faces])
+            turn[faces[(turned != corners[faces]).any(axis=1)]] = -1
+        return turn
 
     @cached_property
     def overlaps(self) -> Overlaps:

@@ -45,6 +45,7 @@ import scipy.sparse.linalg  # noqa: F401  as above
 
 from baselines import registry
 from benchmarks.results import (
+    MISSING,
     SOURCE_CHANGED,
     arrays_hash,
     map_arrays,
@@ -55,8 +56,9 @@ from benchmarks.results import (
     trace_arrays,
     write_arrays,
 )
-from parapoint.method import UnsupportedError, prepared
+from parapoint.method import MissingError, UnsupportedError
 from parapoint.parameterization import Parameterization, PointParameterization
+from parapoint.preparation import prepared
 from parapoint.surface import Mesh, Surface
 
 POLL = 0.05
@@ -219,20 +221,28 @@ def _outcome(job: dict[str, Any]) -> Outcome:
     whole = read_surface(Path(job["surface"]))
     preprocessing = ""
     try:
-        surface, preprocessing = prepared(whole, method.requires)
+        preparation = prepared(whole, method.requires)
+        preprocessing = preparation.steps
+        if hasattr(method, "load"):
+            method.load()
         before, wall = os.times(), time.perf_counter()
-        result = method.parameterize(surface, seed=job["seed"])
+        maps = preparation.maps(method, job["seed"])
         wall, after = time.perf_counter() - wall, os.times()
     except UnsupportedError as error:
-        return {"status": "skipped", "reason": _line(error), "preprocessing": preprocessing}
+        reason = MISSING * isinstance(error, MissingError) + _line(error)
+        return {"status": "skipped", "reason": reason, "preprocessing": preprocessing}
+    except Exception as error:  # noqa: BLE001  as in _perform; the row says what was done before
+        traceback.print_exc()
+        return _failure(error) | {"preprocessing": preprocessing}
     timing = {
         "preprocessing": preprocessing,
         "seconds": wall,
         "cpu_seconds": sum(after[:4]) - sum(before[:4]),
     }
-    reason = fault(surface, result)
-    if reason:
-        return {"status": "failed", "reason": reason} | timing
+    for surface, part in zip(preparation.parts, maps, strict=True):
+        if reason := fault(surface, part):
+            return {"status": "failed", "reason": reason} | timing
+    result = preparation.joined(maps)
     arrays = map_arrays(result)
     everything = arrays | trace_arrays(result.trace)
     report = plain(result.report)
@@ -245,8 +255,8 @@ def _outcome(job: dict[str, Any]) -> Outcome:
 
 def _measured(job: dict[str, Any]) -> Outcome:
     """Every metric of a stored map, numbers as text: JSON has no infinity."""
-    surface, result = read_surface(Path(job["surface"])), read_map(Path(job["measure"]))
-    reference = read_map(Path(job["reference"])) if job["reference"] else None
+    surface, result = read_surface(Path(job["surface"])), read_map(Path(job["uv"]))
+    reference = read_map(Path(job["reference"])) if "reference" in job else None
     assert not isinstance(reference, PointParameterization)
     values = measured(surface, result, reference)
     return {"status": "ok", "metrics": {name: repr(value) for name, value in values.items()}}
@@ -274,8 +284,8 @@ def fault(surface: Surface, result: object) -> str:
 
 
 def _line(error: BaseException) -> str:
-    """The message of an error as one line of bounded length."""
-    return " ".join(str(error).split())[:500]
+    """The message of an error, with its notes, as one line of bounded length."""
+    return " ".join(" ".join([str(error), *getattr(error, "__notes__", [])]).split())[:500]
 
 
 def _failure(error: BaseException) -> Outcome:

@@ -28,19 +28,20 @@ GAP = 0.02
 def components(surface: Surface) -> list[Surface]:
     """The components of a surface, largest first (a mesh's by area, a cloud's by points).
 
-    Of a mesh: faces that share vertices. Of a cloud: connected components of the graph that joins
+    Of a mesh: faces that share vertices, left out where they have no area. Of a cloud: connected components of the graph that joins
     each point to its NEIGHBOURS nearest.
     """
     if isinstance(surface, Mesh):
         label = surface.face_components
         area = np.bincount(label, weights=surface.face_areas)
-        return [_submesh(surface, label == k) for k in np.argsort(-area, kind="stable")]
+        order = [k for k in np.argsort(-area, kind="stable") if area[k] > 0]
+        return [_submesh(surface, label == k) for k in order] or [surface]
     label = cloud_labels(surface.points)
-    order = np.argsort(-np.bincount(label), kind="stable")
+    by_size = np.argsort(-np.bincount(label), kind="stable")
     normals = surface.normals
     return [
         PointCloud(surface.points[label == k], None if normals is None else normals[label == k])
-        for k in order
+        for k in by_size
     ]
 
 

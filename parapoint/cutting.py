@@ -12,7 +12,7 @@ grows from what is open already, one shortest arc after another:
   loops; the surface stays connected, and in the end it is a disk.
 
 A planar domain with holes is cut too when it comes here. The harness does not send it here, as
-methods for disks can leave its inner loops free (`parapoint.method.prepared`).
+methods for disks can leave its inner loops free (`parapoint.preparation`).
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from parapoint.errors import InputError
-from parapoint.method import is_cuttable
 from parapoint.surface import BoolArray, FloatArray, IntArray, Mesh
 
 ROOTS = 8
@@ -41,7 +40,7 @@ def cut_to_disk(mesh: Mesh) -> Mesh:
     Raises:
         InputError: the mesh is not so; a caller splits components beforehand.
     """
-    if not is_cuttable(mesh):
+    if not mesh.is_connected_surface:
         raise InputError(
             f"only a connected, manifold, consistently oriented mesh can be cut to a disk; "
             f"this one is: {mesh.topology}"

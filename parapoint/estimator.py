@@ -133,6 +133,11 @@ class ParaPoint:
     device: str = "auto"
     threads: int | None = None
 
+    @property
+    def deterministic(self) -> bool:
+        """Whether the same seed gives the same map: not where time ends the fit, nor on CUDA."""
+        return self.time_budget is None and _device(self.device) == "cpu"
+
     def get_params(self, deep: bool = True) -> dict[str, Any]:  # noqa: ARG002 (scikit-learn's name)
         """The parameters by name."""
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
@@ -661,7 +666,10 @@ def _read(folder: Path, stem: str) -> tuple[dict[str, Tensor], dict[str, Any]]:
             f"{path}: format version {version}; this parapoint reads version {FORMAT}: fit anew"
         )
     with _damage_of(folder):
-        return safetensors.torch.load((folder / facts["tensors"]).read_bytes()), facts
+        name = facts["tensors"]
+        if Path(name).name != name:
+            raise InputError(f"{path}: names tensors outside of its folder: {name!r}")
+        return safetensors.torch.load((folder / name).read_bytes()), facts
 
 
 @contextmanager

@@ -68,9 +68,10 @@ def read_surface(path: str | Path) -> Surface:
 def read_parameterized(path: str | Path) -> tuple[Mesh, Parameterization]:
     """The mesh in an OBJ (with vt) or glTF file, and the UV map that it carries.
 
-    Rows of `uv` are the file's. Where several rows hold the same UV for the same vertex, as
-    exporters without an index write them, all corners use the first, so that a seam is a place
-    where the map is cut and not a habit of the exporter.
+    Rows of `uv` are the file's, but for two habits of exporters, so that a seam is a place where
+    the map is cut. Where several rows hold the same UV for the same vertex, all corners use the
+    first. A row that serves several places of the surface, as where each UV is written once
+    and charts lie over each other, is repeated at the end, once for each further place.
 
     Raises:
         InputError: as for `read_surface`; the format carries no UV, the file has none or not for
@@ -99,7 +100,8 @@ def read_parameterized(path: str | Path) -> tuple[Mesh, Parameterization]:
                 f"range; the file has {len(content.uv)} UV coordinates"
             )
         uv = read_only(content.uv, np.float64, "uv", 2)
-        return mesh, Parameterization(uv, _shared_corners(mesh, uv, corners))
+        corners = _shared_corners(mesh, uv, corners)
+        return mesh, Parameterization(*_rows_of_one_place(mesh, uv, corners))
 
 
 @contextmanager
@@ -191,6 +193,23 @@ def _shared_corners(mesh: Mesh, uv: FloatArray, corners: IntArray) -> IntArray:
     shared = np.empty_like(flat)
     shared[order] = flat[order][fresh][np.cumsum(fresh) - 1]
     return shared.reshape(-1, 3)
+
+
+def _rows_of_one_place(
+    mesh: Mesh, uv: FloatArray, corners: IntArray
+) -> tuple[FloatArray, IntArray]:
+    """`uv` and `corners` with a further row for each further place that a row serves."""
+    row, position = corners.reshape(-1), mesh.vertices[mesh.faces.reshape(-1)]
+    served = np.zeros((len(uv), 3))
+    served[row] = position
+    if np.array_equal(served[row], position):
+        return uv, corners
+    _, place = np.unique(position, axis=0, return_inverse=True)
+    pairs, pair = np.unique(np.stack([row, place.reshape(-1)], axis=1), axis=0, return_inverse=True)
+    again = np.zeros(len(pairs), dtype=bool)
+    again[1:] = pairs[1:, 0] == pairs[:-1, 0]
+    new_row = np.where(again, len(uv) + np.cumsum(again) - 1, pairs[:, 0])
+    return np.concatenate([uv, uv[pairs[again, 0]]]), new_row[pair.reshape(-1)].reshape(-1, 3)
 
 
 def _point_cloud(content: Content, path: Path) -> PointCloud:

@@ -6,12 +6,15 @@ from collections.abc import Callable
 from typing import ClassVar, Protocol, runtime_checkable
 
 from parapoint.parameterization import Parameterization, PointParameterization
-from parapoint.surface import Mesh, PointCloud, Surface
+from parapoint.surface import PointCloud, Surface
 
 
 @runtime_checkable
 class Method(Protocol):
     """A parameterization method: a dataclass whose fields are its hyperparameters.
+
+    It may have a method `load()`, called once before `parameterize` is timed: there it imports or
+    starts what is slow to come, and raises MissingError where that is not installed.
 
     Attributes:
         requires: what the surface must be, words of `REQUIREMENTS`. Empty: a mesh or a point cloud.
@@ -33,15 +36,21 @@ class UnsupportedError(Exception):
     """A method cannot take a surface; the message says why. The cell is `skipped`."""
 
 
-def _topology_unless(holds: Callable[[Mesh], bool], need: str) -> Callable[[Surface], str | None]:
-    """A requirement on a mesh: None where it holds, else the reason with the surface's topology."""
+class MissingError(UnsupportedError):
+    """A method needs a package or program that is not there; the message says how to get it.
 
-    def reason(surface: Surface) -> str | None:
-        if isinstance(surface, PointCloud):
-            return "needs faces; the surface is a point cloud"
-        return None if holds(surface) else f"needs {need}; the surface is {surface.topology}"
+    The cell is `skipped`, and the next run tries it again.
+    """
 
-    return reason
+
+def _not_a_mesh(surface: Surface) -> str | None:
+    return "needs faces; the surface is a point cloud" if isinstance(surface, PointCloud) else None
+
+
+def _not_a_disk(surface: Surface) -> str | None:
+    if isinstance(surface, PointCloud) or surface.topology == "disk":
+        return _not_a_mesh(surface)
+    return f"needs a disk; the surface is {surface.topology}"
 
 
 def _cuda_missing(_: Surface) -> str | None:
@@ -50,54 +59,23 @@ def _cuda_missing(_: Surface) -> str | None:
     return None if torch.cuda.is_available() else "needs a CUDA device; none is available"
 
 
-def is_planar_domain(mesh: Mesh) -> bool:
-    """Whether the mesh is a disk, with or without holes: it embeds in the plane without a cut."""
-    return (
-        mesh.is_manifold
-        and mesh.is_oriented
-        and mesh.component_count == 1
-        and len(mesh.boundary_loops) > 0
-        and mesh.genus == 0
-    )
-
-
-def is_cuttable(mesh: Mesh) -> bool:
-    """Whether `cutting.cut_to_disk` can open the mesh: connected, manifold and oriented."""
-    return mesh.is_manifold and mesh.is_oriented and mesh.component_count == 1
-
-
 REQUIREMENTS: dict[str, Callable[[Surface], str | None]] = {
-    "faces": _topology_unless(lambda _: True, "faces"),
-    "manifold": _topology_unless(lambda mesh: mesh.is_manifold, "a manifold mesh"),
-    "oriented": _topology_unless(lambda mesh: mesh.is_oriented, "consistently oriented faces"),
-    "connected": _topology_unless(lambda mesh: mesh.component_count == 1, "a connected mesh"),
-    "disk": _topology_unless(lambda mesh: mesh.topology == "disk", "a disk"),
-    "disk_after_cut": _topology_unless(
-        is_cuttable, "a connected, manifold, consistently oriented mesh (others have no disk cut)"
-    ),
+    "faces": _not_a_mesh,
+    "manifold": _not_a_mesh,
+    "oriented": _not_a_mesh,
+    "connected": _not_a_mesh,
+    "disk": _not_a_disk,
+    "disk_after_cut": _not_a_mesh,
     "cuda": _cuda_missing,
 }
-"""Each word of `Method.requires`: the reason why a surface does not meet it, or None.
+"""Each word of `Method.requires`: the reason why a surface cannot meet it, or None.
 
-`disk` takes a disk as it is and nothing else. `disk_after_cut` also takes what can be cut to one:
-a surface that is no disk (with or without holes) is cut before the method sees it, by the same
-automatic cut for every method, and the row says so.
+What is not `manifold` (at most two faces at an edge, one fan at a vertex), `oriented` (neighbouring
+faces turn alike) or `connected` is made so before the method sees it, the same way for every
+method, and the row says how (`parapoint.preparation`). `disk` takes a disk as it is and nothing
+else. `disk_after_cut` asks for all of these and takes what is cut to a disk: a surface that is one,
+with or without holes, comes as it is.
 """
 
-
-def prepared(surface: Surface, requires: frozenset[str]) -> tuple[Surface, str]:
-    """`surface` as a method that `requires` these words gets it, and the step taken ("" for none).
-
-    Raises:
-        UnsupportedError: the surface does not meet a requirement.
-        KeyError: a word is not in REQUIREMENTS.
-    """
-    for word in sorted(requires):
-        reason = REQUIREMENTS[word](surface)
-        if reason is not None:
-            raise UnsupportedError(reason)
-    if "disk_after_cut" in requires and isinstance(surface, Mesh) and not is_planar_domain(surface):
-        from parapoint.cutting import cut_to_disk
-
-        return cut_to_disk(surface), "automatic cut to a disk"
-    return surface, ""
+REPAIRED = frozenset({"manifold", "oriented", "connected", "disk_after_cut"})
+"""The words that `parapoint.preparation` makes true of a mesh."""

@@ -60,6 +60,13 @@ def edge_table(triangles: IntArray) -> tuple[IntArray, IntArray, IntArray]:
     return edges, edge_of_halfedge.reshape(-1).astype(np.int64), count.astype(np.int64)
 
 
+def flat_faces(vertices: FloatArray, faces: IntArray) -> BoolArray:
+    """(F,) which triangles have no area beyond rounding: no cotangent, gradient or normal."""
+    longest = igl.squared_edge_lengths(vertices, faces).max(axis=1)
+    flat = igl.doublearea(vertices, faces) <= 8 * np.finfo(np.float64).eps * longest
+    return np.asarray(flat, dtype=bool)
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """A triangle mesh.
@@ -167,6 +174,16 @@ class Mesh:
     def is_oriented(self) -> bool:
         """No directed edge stands twice: neighbouring faces turn the same way."""
         return len(np.unique(self.halfedges, axis=0)) == len(self.halfedges)
+
+    @property
+    def is_connected_surface(self) -> bool:
+        """Connected, manifold and consistently oriented: what can be cut to a disk."""
+        return self.is_manifold and self.is_oriented and self.component_count == 1
+
+    @property
+    def is_planar_domain(self) -> bool:
+        """Whether it is a disk, with or without holes: it embeds in the plane without a cut."""
+        return self.is_connected_surface and len(self.boundary_loops) > 0 and self.genus == 0
 
     @property
     def genus(self) -> int:

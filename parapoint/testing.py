@@ -11,8 +11,9 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from parapoint.cutting import cut_along
-from parapoint.method import REQUIREMENTS, Method, UnsupportedError, prepared
+from parapoint.method import REQUIREMENTS, Method, MissingError, UnsupportedError
 from parapoint.parameterization import Parameterization, PointParameterization
+from parapoint.preparation import prepared
 from parapoint.surface import FloatArray, IntArray, Mesh, PointCloud, Surface
 
 SEED = 7
@@ -22,11 +23,12 @@ def check_method(method: Method, surface: Surface | None = None) -> None:
     """Hold a method to the protocol, on tiny surfaces (under 200 vertices each).
 
     - It is a dataclass, its parameters and its report can be written as JSON, it can be pickled.
-    - `requires` has known words only and is honest: what it admits is parameterized (after the cut
-      where it says `disk_after_cut`); a method that needs faces raises on a point cloud.
+    - `requires` has known words only and is honest: what it admits is parameterized (as
+      `parapoint.preparation` hands it over); a method that needs faces raises on a point cloud.
     - The map has the type for the surface, is finite and not collapsed to a line, and its faces and
       corners are in the order of the mesh.
-    - The same seed gives the same map, bit by bit. The arrays of the surface do not change.
+    - The same seed gives the same map, bit by bit, unless the method says that it is not
+      `deterministic`. The arrays of the surface do not change.
     - A trace counts up in steps and seconds, and its maps are finite and of the result's shape.
 
     Args:
@@ -35,8 +37,8 @@ def check_method(method: Method, surface: Surface | None = None) -> None:
 
     Raises:
         AssertionError: a promise is broken; the message says which, and on which surface.
-        UnsupportedError: nothing could be checked, as the method refuses every surface (a package
-            that it needs is missing, say).
+        MissingError: a package or program that the method needs is not there.
+        UnsupportedError: nothing could be checked, as the method refuses every surface.
     """
     name = type(method).__name__
     _check_declaration(method, name)
@@ -46,16 +48,18 @@ def check_method(method: Method, surface: Surface | None = None) -> None:
     for title, sample in surfaces.items():
         where = f"{name} on {title}"
         try:
-            given, _ = prepared(sample, method.requires)
+            preparation = prepared(sample, method.requires)
         except UnsupportedError as error:
             refusal = error
             if isinstance(sample, PointCloud):
                 _check_refusal(method, sample, where)
             continue
         try:
-            first = _check_run(method, given, where)
-            if not checked:
-                _check_repeat(method, given, first, where)
+            maps = [_check_run(method, part, where) for part in preparation.parts]
+            if not checked and getattr(method, "deterministic", True):
+                _check_repeat(method, preparation.parts[0], maps[0], where)
+        except MissingError:
+            raise
         except UnsupportedError as error:
             refusal = error
             if checked:
@@ -86,6 +90,7 @@ def sample_surfaces() -> dict[str, Surface]:
         "a disk with a hole": holed,
         "a sphere": sphere(),
         "two components": two,
+        "a defective mesh": defective(),
         "a point cloud": PointCloud(np.column_stack([plane, 0.3 * plane[:, 0] ** 2])),
     }
 
@@ -116,6 +121,16 @@ def sphere() -> Mesh:
     inward = np.linalg.det(points[faces]) < 0
     faces[inward] = faces[inward][:, ::-1]
     return Mesh(points, faces)
+
+
+def defective() -> Mesh:
+    """`sphere` with a fin on an edge, a copy of a face, one without area, and faces turned over."""
+    whole = sphere()
+    a, b, c = whole.faces[0]
+    added = np.array([[a, b, len(whole.vertices)], [b, c, a], [a, b, b]])
+    faces = np.concatenate([added, whole.faces])
+    faces[7::9] = faces[7::9, ::-1]
+    return Mesh(np.concatenate([whole.vertices, 1.5 * whole.vertices[[a]]]), faces)
 
 
 def _check_declaration(method: Method, name: str) -> None:

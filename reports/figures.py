@@ -38,6 +38,7 @@ from benchmarks.metrics import MapState
 from benchmarks.results import ResultRow
 from parapoint.errors import InputError
 from parapoint.parameterization import Parameterization
+from parapoint.preparation import CUT
 from parapoint.surface import Mesh
 from reports.contents import Contents, Label
 from reports.pictures import (
@@ -283,7 +284,7 @@ def surface_of(contents: Contents, case: str) -> Mesh | None:
 
 def is_cut(contents: Contents, case: str) -> bool:
     """Whether some method got the model with an automatic cut."""
-    return any(row.preprocessing for row in contents.rows if row.case == case)
+    return any(CUT in row.preprocessing for row in contents.rows if row.case == case)
 
 
 def disks(contents: Contents, pictures: Path) -> Figure | None:
@@ -334,7 +335,7 @@ def cut_model(contents: Contents, case: str, pictures: Path) -> Figure | None:
     for number, label in enumerate(chosen):
         row = contents.shown(case, label)
         x = ((1 + 2 * number) * (side + 0.04) + side + 0.02) / WIDTH
-        cut = "automatic cut" if row is not None and row.preprocessing else "learned seam"
+        cut = "automatic cut" if row is not None and CUT in row.preprocessing else "learned seam"
         head = f"({'bc'[number]}) {label.name}, {cut}"
         made.text(x, 0.5 / (side + foot), head, ha="center", va="top")
         if row is not None:

@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Literal, NamedTuple
 
 from benchmarks.metrics import METRICS
+from parapoint.preparation import CUT
 from reports.contents import Contents
 from reports.published import AUTHORS, Verdict, claim_text, published_values, verdicts
 
@@ -345,7 +346,7 @@ def method_notes(contents: Contents) -> list[str]:
             steps.setdefault(row.preprocessing, set()).add(row.case)
     for step, cases in steps.items():
         notes.append(
-            f"{step.capitalize()}, the same for every method that needs one: "
+            f"{step.capitalize()}, the same for every method that needs it: "
             f"{', '.join(sorted(cases))}."
         )
     return notes
@@ -492,7 +493,7 @@ def supplement(contents: Contents) -> Table:
             record = records.get((case, label.short))
             if record is None:
                 continue
-            cut = " + automatic cut" if record["preprocessing"] else ""
+            cut = " + automatic cut" if CUT in str(record["preprocessing"]) else ""
             row: dict[str, Value] = {
                 "case": f"{case} ({claim_text(case)})" if authors else case,
                 "method": label.text + cut,

@@ -12,7 +12,7 @@ from baselines.flattening import FlatteningError, signed_areas
 from baselines.meshlab import matched_faces
 from baselines.optional import Missing, optional
 from parapoint.errors import InputError
-from parapoint.method import UnsupportedError
+from parapoint.method import MissingError
 from parapoint.surface import Mesh
 from parapoint.testing import irregular_disk, sphere
 
@@ -150,16 +150,35 @@ def test_panic_of_uvunwrap_is_a_failure_of_the_method(monkeypatch):
         mapped("uvunwrap", cube())
 
 
+def test_uvatlas_options_reach_the_library():
+    pytest.importorskip("open3d", exc_type=ImportError)
+    flat = irregular_disk()
+    flat = Mesh(flat.vertices * [1, 1, 0], flat.faces)
+    few, result = mapped("uvatlas(max_stretch=1)", sphere()), mapped("uvatlas", flat)
+    assert result.charts().max() == 0
+    assert_allclose(edge_ratios(flat, result), edge_ratios(flat, result)[0, 0], rtol=2e-2)
+    assert mapped("uvatlas(max_stretch=0)", sphere()).charts().max() > few.charts().max()
+    assert 256 < np.ptp(result.uv, axis=0).max() <= 512
+    close, apart = (mapped(f"uvatlas(size=128, gutter={g})", sphere()) for g in (1, 20))
+    assert np.ptp(close.uv, axis=0).max() <= 128
+    used = [np.abs(signed_areas(made.uv, made.corners)).sum() for made in (close, apart)]
+    assert used[1] < 0.8 * used[0]
+    with pytest.raises(InputError, match="max_stretch must lie between 0 and 1"):
+        registry.method("uvatlas(max_stretch=3)")
+
+
 def test_missing_package_says_what_to_install():
     missing = optional("no_such_package", "pip install it")
     assert isinstance(missing, Missing)
-    with pytest.raises(UnsupportedError, match="needs the package no_such_package: pip install it"):
+    with pytest.raises(MissingError, match="needs the package no_such_package: pip install it"):
         missing.Atlas()
     assert not hasattr(missing, "__len__")
     assert optional("json", "").dumps(1) == "1"
 
 
 def test_method_of_a_missing_package_is_unsupported(monkeypatch):
+    gone = Missing("needs the package open3d: pip install open3d")
+    monkeypatch.setattr("baselines.uvatlas.open3d", lambda: gone)
     for module, name in (
         ("xatlas_charts", "xatlas"),
         ("uvunwrap", "uvunwrap"),
@@ -167,8 +186,11 @@ def test_method_of_a_missing_package_is_unsupported(monkeypatch):
     ):
         gone = Missing(f"needs the package {name}: pip install {name}")
         monkeypatch.setattr(f"baselines.{module}.{name}", gone)
-    for spec in ("xatlas", "uvunwrap", "meshlab_lscm", "meshlab_voronoi", "meshlab_triangles"):
-        with pytest.raises(UnsupportedError, match="pip install"):
+    for spec in (
+        *("xatlas", "uvatlas", "uvunwrap"),
+        *("meshlab_lscm", "meshlab_harmonic", "meshlab_voronoi", "meshlab_triangles"),
+    ):
+        with pytest.raises(MissingError, match="pip install"):
             mapped(spec, irregular_disk())
 
 
@@ -198,7 +220,7 @@ def test_external_program_that_fails_says_why(tmp_path, program, fault):
 
 
 def test_external_program_must_exist_and_have_places():
-    with pytest.raises(UnsupportedError, match="needs the program no_such_tool"):
+    with pytest.raises(MissingError, match="needs the program no_such_tool"):
         mapped("external(command='no_such_tool {input} {output}')", cube())
     for spec in ("external", "external(command='tool {input}')"):
         with pytest.raises(InputError, match=r"needs \{(input|output)\}"):

@@ -2,11 +2,12 @@
 
 import subprocess
 import sys
+from unittest import mock
 
 import pytest
 
 from baselines import registry
-from parapoint.method import UnsupportedError
+from parapoint.method import MissingError
 from parapoint.testing import check_method
 
 COPY = (  # an external program: every vertex to its x and y
@@ -30,11 +31,14 @@ def method(name):
     return registry.method(f"{name}({spec})")[1]
 
 
-@pytest.mark.parametrize("name", sorted(registry.METHODS.keys() - {"meshlab_voronoi"}))
+UNSEEDED = {"meshlab_voronoi", "uvatlas"}
+
+
+@pytest.mark.parametrize("name", sorted(registry.METHODS.keys() - UNSEEDED))
 def test_registered_method_conforms(name):
     try:
         check_method(method(name))
-    except UnsupportedError as error:
+    except MissingError as error:
         pytest.skip(str(error))
 
 
@@ -54,3 +58,11 @@ def test_meshlab_voronoi_repeats_its_map_in_a_fresh_process_only():
     )
     runs = [subprocess.check_output([sys.executable, "-c", code]) for _ in range(2)]
     assert runs[0] == runs[1]
+
+
+def test_uvatlas_keeps_every_promise_but_the_same_map():
+    pytest.importorskip("open3d", exc_type=ImportError)
+    with pytest.raises(AssertionError, match="another map under the same seed"):
+        check_method(method("uvatlas"))
+    with mock.patch("parapoint.testing._check_repeat"):
+        check_method(method("uvatlas"))

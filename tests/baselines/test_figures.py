@@ -9,7 +9,7 @@ import pytest
 
 from baselines import registry
 from baselines.flattening import signed_areas
-from parapoint.method import prepared
+from parapoint.preparation import prepared
 
 
 def model(name):
@@ -68,7 +68,8 @@ def test_conformality_of_slim_after_20_iterations(name, expected, tolerance):
 @pytest.mark.parametrize("name", ["spot_c3d", "fertility", "torus_odedstein", "kitten.nf20k"])
 def test_closed_models_are_cut_to_disks_that_tutte_embeds(name):
     method = registry.method("tutte")[1]
-    disk, step = prepared(model(name), method.requires)
-    assert step == "automatic cut to a disk"
+    preparation = prepared(model(name), method.requires)
+    assert preparation.steps == "automatic cut to a disk"
+    (disk,) = preparation.parts
     assert disk.topology == "disk"
     assert method.parameterize(disk, seed=0).report == {"flipped": 0, "degenerate": 0}

@@ -136,6 +136,12 @@ def test_a_run_goes_from_a_file_and_a_plugin_to_a_checked_folder(
     assert command(*arguments, "--strict") == 1
     assert "custom: 0 cells to run; 2 are done already" in capsys.readouterr().out
 
+    Store("results").uv_path(rows["tutte"].id).unlink()
+    assert command(*arguments) == 0
+    shown = capsys.readouterr()
+    assert "custom: 1 cells to run (1 map missing); 1 are done already" in shown.out
+    assert "again: mesh.off, tutte, seed 0: map missing" in shown.out
+
     assert command("check", "results") == 0
     assert "2 cells, 1 maps: no faults" in capsys.readouterr().out
     store = Store("results")

@@ -65,6 +65,25 @@ def test_the_majority_is_by_3d_area():
     assert found.flipped.tolist() == [False, True, True]
 
 
+def test_faces_that_the_mesh_itself_turns_over_are_no_flips():
+    points, faces = strip(6, 5)
+    uv = points.copy()
+    folded = state(Mesh(lifted(points), faces), Parameterization(uv, faces)).validity
+    assert not folded.flipped.any()
+    odd = np.random.default_rng(3).permutation(len(faces))[:20]
+    mixed = faces.copy()
+    mixed[odd] = mixed[odd][:, ::-1]
+    assert not state(
+        Mesh(lifted(points), mixed), Parameterization(uv, mixed)
+    ).validity.flipped.any()
+    corner = int(np.flatnonzero((points == points.min(axis=0)).all(axis=1))[0])
+    uv[corner] = points.mean(axis=0)  # a fold, whichever way its faces were written
+    expected = state(Mesh(lifted(points), faces), Parameterization(uv, faces)).validity.flipped
+    assert expected.any()
+    found = state(Mesh(lifted(points), mixed), Parameterization(uv, mixed)).validity.flipped
+    assert found.tolist() == expected.tolist()
+
+
 def test_flips_agree_with_igl():
     rng = np.random.default_rng(0)
     points, faces = strip(12, 12)

@@ -14,9 +14,10 @@ import pytest
 from baselines import registry
 from benchmarks import worker
 from benchmarks.environment import ROOT
-from benchmarks.results import Store, read_map
+from benchmarks.results import Store, measured, read_map, read_surface
 from parapoint.parameterization import Parameterization, PointParameterization
 from parapoint.surface import Mesh, PointCloud
+from parapoint.testing import sample_surfaces
 
 TRIANGLE = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
 CLOUD = PointCloud(TRIANGLE.vertices)
@@ -72,6 +73,48 @@ def test_an_error_is_one_line(error, status, reason):
     outcome = worker._failure(error)
     assert outcome["status"] == status
     assert reason is None or outcome["reason"] == reason
+
+
+def test_a_row_says_what_was_done_to_the_surface_before_and_in_which_component_it_failed(
+    tmp_path, monkeypatch
+):
+    store = Store(tmp_path)
+    with store.writing():
+        surface = store.add_surface(sample_surfaces()["a defective mesh"])
+    method = registry.method("tutte")[1]
+    job = {
+        "spec": "tutte",
+        "plugins": [],
+        "seed": 0,
+        "source_hash": registry.source_hash(method),
+        "surface": str(store.surface_path(surface)),
+        "map": str(tmp_path / "map.npz"),
+    }
+    steps = (
+        "dropped 1 face without area; dropped 1 duplicate face; split 1 non-manifold edge; split 2 "
+        "non-manifold vertices; turned 20 faces; packed 2 components; "
+        "automatic cut to a disk (1 of 2 components)"
+    )
+    outcome = worker._outcome(job)
+    assert (outcome["status"], outcome["preprocessing"]) == ("ok", steps)
+    mesh, result = read_surface(store.surface_path(surface)), read_map(tmp_path / "map.npz")
+    values = measured(mesh, result)
+    assert values["chart_count"] == 2
+    assert values["degenerate_3d_count"] == 1
+    assert values["degenerate_uv_count"] == 0
+    # The copy lies on its face, whose rows it shares, the other way round.
+    assert values["flipped_fraction"] == 1 / len(mesh.faces)
+    assert values["overlap_pair_fraction"] == 0
+    assert values["overlapped_fraction"] > 0
+    assert values["bijective"] == 0
+
+    def refusing(*_, **__):
+        raise ValueError("no")
+
+    monkeypatch.setattr(type(method), "parameterize", refusing)
+    outcome = worker._outcome(job)
+    assert (outcome["status"], outcome["preprocessing"]) == ("failed", steps)
+    assert outcome["reason"] == "ValueError: no (component 1 of 2, 176 faces)"
 
 
 def test_a_message_counts_only_if_it_is_whole():

@@ -208,6 +208,18 @@ def test_a_model_of_another_version_or_a_damaged_one_is_one_line(fitted, tmp_pat
         ParaPoint.load(tmp_path)
 
 
+def test_a_model_that_names_tensors_elsewhere_is_refused(fitted, tmp_path) -> None:
+    (tmp_path / "other").mkdir()
+    fitted.save(tmp_path / "model")
+    file = next((tmp_path / "model").glob("*.safetensors"))
+    file.rename(tmp_path / "other" / file.name)
+    facts = json.loads((tmp_path / "model" / "model.json").read_text())
+    for name in (f"../other/{file.name}", str(tmp_path / "other" / file.name)):
+        (tmp_path / "model" / "model.json").write_text(json.dumps({**facts, "tensors": name}))
+        with pytest.raises(InputError, match="names tensors outside of its folder"):
+            ParaPoint.load(tmp_path / "model")
+
+
 FAST = {"preset": "fast", "iterations": 3, "device": "cpu"}
 
 

@@ -134,6 +134,21 @@ def test_equal_uv_of_one_vertex_is_no_seam(tmp_path):
     assert len(parameterization.seams(mesh)) == 0
 
 
+def test_uv_written_once_for_two_places_joins_no_charts(tmp_path):
+    # Two triangles apart in space, drawn on the same three vt lines.
+    places = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 0 0\nv 6 0 0\nv 5 1 0\n"
+    text = places + "vt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\nf 4/1 5/2 6/3\n"
+    _, parameterization = read_parameterized(saved(tmp_path, "a.obj", text))
+    assert_array_equal(parameterization.corners, [[0, 1, 2], [3, 4, 5]])
+    assert_array_equal(parameterization.uv, 2 * [[0, 0], [1, 0], [0, 1]])
+    assert_array_equal(parameterization.charts(), [0, 1])
+    # Vertices that the file doubles, as renderers need them, are one place: no seam is made of it.
+    welded = text.replace("v 5 0 0", "v 1 0 0").replace("v 6 0 0", "v 1 1 0")
+    welded = welded.replace("v 5 1 0", "v 0 1 0").replace("f 4/1 5/2 6/3", "f 4/2 5/1 6/3")
+    _, parameterization = read_parameterized(saved(tmp_path, "b.obj", welded))
+    assert_array_equal(parameterization.corners, [[0, 1, 2], [1, 3, 2]])
+
+
 def test_obj_without_faces_is_a_point_cloud(tmp_path):
     assert_array_equal(
         cloud_of(tmp_path, "a.obj", "v 1 2 3\nv 4 5 6\n").points, [[1, 2, 3], [4, 5, 6]]
@@ -408,6 +423,65 @@ def test_gltf_is_placed_welded_and_keeps_uv_without_a_material(tmp_path, form):
     np.testing.assert_allclose(mesh.vertices, np.stack([10 - y, x, 0 * x], axis=1), atol=1e-12)
     assert_array_equal(parameterization.uv[parameterization.corners], SQUARE[TRIANGLES][..., :2])
     assert len(parameterization.seams(mesh)) == 0
+
+
+def test_a_cube_as_blender_writes_it_is_one_chart_in_both_formats(tmp_path):
+    # OBJ: quads, each vt and vn once a vertex, an object, smoothing off. GLB: triangles, a vertex
+    # for each corner of a flat face, v downwards. Both files are the same map with seven seams.
+    sides = np.array(
+        [
+            [[0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]],
+            [[1, 0, 1], [1, 0, 0], [1, 1, 0], [1, 1, 1]],
+            [[1, 0, 0], [0, 0, 0], [0, 1, 0], [1, 1, 0]],
+            [[0, 0, 0], [0, 0, 1], [0, 1, 1], [0, 1, 0]],
+            [[0, 1, 1], [1, 1, 1], [1, 1, 0], [0, 1, 0]],
+            [[0, 0, 0], [1, 0, 0], [1, 0, 1], [0, 0, 1]],
+        ]
+    )
+    cross = np.array([[1, 1], [2, 1], [3, 1], [0, 1], [1, 2], [1, 0]])
+    squares = (cross[:, None] + [[0, 0], [1, 0], [1, 1], [0, 1]]) / 4
+    points, point = np.unique(sides.reshape(-1, 3), axis=0, return_inverse=True)
+    uv, row = np.unique(squares.reshape(-1, 2), axis=0, return_inverse=True)
+    lines = ["# Blender 5.0.1", "# www.blender.org", "mtllib cube.mtl", "o Cube"]
+    lines += ["v {:.6f} {:.6f} {:.6f}".format(*p) for p in points]
+    lines += ["vn 0.0000 0.0000 1.0000", *("vt {:.6f} {:.6f}".format(*p) for p in uv), "s 0"]
+    corners = [f"{v + 1}/{t + 1}/1" for v, t in zip(point.ravel(), row.ravel(), strict=True)]
+    lines += ["f " + " ".join(corners[k : k + 4]) for k in range(0, 24, 4)]
+    blob = sides.astype("<f4").tobytes() + (squares * [1, -1] + [0, 1]).astype("<f4").tobytes()
+    indices = np.array([0, 1, 2, 0, 2, 3], "<u2") + 4 * np.arange(6, dtype="<u2")[:, None]
+    kinds = [(5126, 24, "VEC3"), (5126, 24, "VEC2"), (5123, 36, "SCALAR")]
+    sizes = np.array([288, 192, 72])
+    tree = {
+        "asset": {"generator": "Khronos glTF Blender I/O v5.0.21", "version": "2.0"},
+        "scene": 0,
+        "scenes": [{"name": "Scene", "nodes": [0]}],
+        "nodes": [{"mesh": 0, "name": "Cube"}],
+        "meshes": [
+            {"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "indices": 2}]}
+        ],
+        "accessors": [
+            {"bufferView": k, "componentType": kind, "count": count, "type": name}
+            for k, (kind, count, name) in enumerate(kinds)
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": int(end - size), "byteLength": int(size)}
+            for end, size in zip(np.cumsum(sizes), sizes, strict=True)
+        ],
+        "buffers": [{"byteLength": int(sizes.sum())}],
+    }
+    maps = [
+        read_parameterized(saved(tmp_path, "cube.obj", "\n".join(lines))),
+        read_parameterized(saved(tmp_path, "cube.glb", glb_bytes(tree, blob + indices.tobytes()))),
+    ]
+    for mesh, parameterization in maps:
+        assert mesh.topology == "sphere"
+        assert len(np.unique(parameterization.corners)) == 14
+        assert parameterization.charts().max() == 0
+        assert len(parameterization.seams(mesh)) == 7
+        halves = sides[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3)
+        assert_array_equal(mesh.vertices[mesh.faces], halves)
+    placed = [parameterization.uv[parameterization.corners] for _, parameterization in maps]
+    assert_array_equal(*placed)
 
 
 def test_gltf_strip(tmp_path):

@@ -6,8 +6,9 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from parapoint.method import REQUIREMENTS, UnsupportedError, prepared
+from parapoint.method import REQUIREMENTS, UnsupportedError
 from parapoint.parameterization import Parameterization, PointParameterization, TracePoint
+from parapoint.preparation import prepared
 from parapoint.surface import Mesh, PointCloud
 from parapoint.testing import check_method, irregular_disk, sample_surfaces
 
