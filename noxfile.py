@@ -52,7 +52,7 @@ def tests(session: nox.Session) -> None:
 def blender(session: nox.Session) -> str:
     """The interpreter of an environment that holds Blender and nothing else, made at need.
 
-    bpy pins an old numpy, and has wheels for these Pythons only (5.0 for 3.11, 5.1 on for 3.13).
+    bpy pins an old numpy, and has wheels for these Pythons only (5.0.1 for 3.11, 5.2 for 3.13).
     """
     folder = session.cache_dir.absolute() / "blender"
     interpreter = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")

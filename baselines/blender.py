@@ -97,7 +97,10 @@ def unwrapped(
 
 
 class Waiting:
-    """What the four methods share: Blender is started before the clock."""
+    """What the four methods share: Blender is started before the clock.
+
+    Of a surface that comes in several components the first one's start only: the others' count.
+    """
 
     def load(self) -> None:
         """Start the process that the next map will use.

@@ -32,8 +32,7 @@ class UVAtlas:
 
     K. Zhou et al. 2004, "Iso-charts: stretch-driven mesh parameterization using spectral
     analysis", as https://github.com/microsoft/UVAtlas has it and Open3D wraps it. Works in float32
-    and on one thread. Its random numbers cannot be seeded: charts stay nearly the same from run to
-    run, their places do not.
+    and on one thread. Charts stay nearly the same from run to run, their places do not.
 
     Attributes:
         max_stretch: largest stretch of a chart, from 0 (none; many charts) to 1 (any; few charts).
@@ -50,7 +49,7 @@ class UVAtlas:
 
     requires: ClassVar[frozenset[str]] = frozenset({"faces", "manifold"})
     packages: ClassVar[tuple[str, ...]] = ("open3d",)
-    deterministic: ClassVar[bool] = False
+    deterministic: ClassVar[bool] = False  # its random numbers cannot be seeded
 
     def __post_init__(self) -> None:
         if not 0 <= self.max_stretch <= 1:

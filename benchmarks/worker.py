@@ -219,6 +219,10 @@ def _outcome(job: dict[str, Any]) -> Outcome:
     if registry.source_hash(method) != job["source_hash"]:
         return {"status": "failed", "reason": SOURCE_CHANGED}
     whole = read_surface(Path(job["surface"]))
+    if isinstance(whole, Mesh) and "reference" in job and "seams" in method.requires:
+        reference = read_map(Path(job["reference"]))
+        assert isinstance(reference, Parameterization)
+        whole = Mesh(whole.vertices, whole.faces, reference.seams(whole))
     preprocessing = ""
     try:
         preparation = prepared(whole, method.requires)

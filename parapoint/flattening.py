@@ -1,8 +1,8 @@
 """A nearly conformal map of a bare cloud with short seams, computed: the `fast` preset starts here.
 
-The cloud is triangulated, cut, and flattened by two linear solves: one for the scale of the map,
-one for the map of that scale. The cuts lead to where the scale is most extreme (as in Sawhney and
-Crane 2017, "Boundary first flattening", section 6), and are as long as an even scale needs.
+The cloud is triangulated, cut, and flattened by a bijective map. The cuts lead to where the scale
+of a conformal map, found by a linear solve, is most extreme (as in Sawhney and Crane 2017,
+"Boundary first flattening", section 6), and are as long as an even scale needs.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import igl
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
-from scipy.sparse.linalg import splu
 
+from parapoint.bijection import bijective_map, factored, signed_areas
 from parapoint.cutting import cut_along, cut_to_disk
 from parapoint.reconstruction import ReconstructionError, triangulation
 from parapoint.surface import FloatArray, IntArray, Mesh
@@ -27,10 +27,6 @@ TIPS = 3
 """Extremal points that are tried as the tip of each cut."""
 COTANGENTS = (0.02, 20.0)
 """Range of the edge weights of a Laplacian: positive, for the maximum principle."""
-FLATTEST = 0.02
-"""Least height of a triangle in its longest edges."""
-MOST_FLIPPED = 0.005
-"""With a larger share of flipped triangles least squares conformal maps are tried."""
 LONELY = 6.0
 """Cost of a vertex most of whose edges cross the seam, in such edges' share."""
 SWEEPS = 10
@@ -48,7 +44,7 @@ class FlatMap(NamedTuple):
         jacobians: (A, 2, 3) d uv / d x.
         inverse_jacobians: (A, 3, 2) d x / d uv.
         facts: what was found, for reports: genus and boundary loops of the triangulation, faces,
-            seam edges, share of flipped triangles.
+            seam edges.
     """
 
     anchors: IntArray
@@ -75,13 +71,11 @@ def flat_map(points: FloatArray) -> FlatMap:
     mesh = Mesh(points[reached], row[mesh.faces])
     try:
         disk = _seamed(mesh)
-        uv = _layout(disk)
-    except (RuntimeError, np.linalg.LinAlgError) as error:  # a singular factor
+        uv = bijective_map(disk)
+    except (RuntimeError, np.linalg.LinAlgError) as error:  # a singular factor, no bijection
         raise ReconstructionError(f"the triangulation has no flat map ({error})") from None
-    if not np.isfinite(uv).all():
-        raise ReconstructionError("the triangulation has no flat map (it is not finite)")
     uv -= (uv.max(axis=0) + uv.min(axis=0)) / 2
-    uv *= np.sqrt(disk.face_areas.sum() / np.abs(_signed_areas(uv, disk.faces)).sum())
+    uv *= np.sqrt(disk.face_areas.sum() / signed_areas(uv, disk.faces).sum())
     chosen = _chosen_copies(disk, _origin(mesh, disk))
     jacobians = _vertex_jacobians(disk, uv)[chosen]
     boundary = [int((of.edge_face_count == 1).sum()) for of in (mesh, disk)]
@@ -90,7 +84,6 @@ def flat_map(points: FloatArray) -> FlatMap:
         "boundary_loops": len(mesh.boundary_loops),
         "faces": len(mesh.faces),
         "seam_edges": (boundary[1] - boundary[0]) // 2,
-        "flipped": float((_signed_areas(uv, disk.faces) <= 0).mean()),
     }
     inverse: FloatArray = np.asarray(np.linalg.pinv(jacobians, rcond=0.1), dtype=np.float64)
     return FlatMap(reached, uv[chosen], jacobians, inverse, facts)
@@ -120,15 +113,6 @@ def _graph(mesh: Mesh) -> sparse.csr_matrix:
     length = np.linalg.norm(mesh.vertices[i] - mesh.vertices[j], axis=1)
     upper = sparse.coo_matrix((length + length.mean(), (i, j)), (len(mesh.vertices),) * 2)
     return (upper + upper.T).tocsr()
-
-
-def _inner_edges(mesh: Mesh) -> tuple[IntArray, IntArray]:
-    """(E, 2) the two halfedges at each inner edge, and (E, 2) their faces."""
-    order = np.argsort(mesh.edge_of_halfedge, kind="stable")
-    edge = mesh.edge_of_halfedge[order]
-    first = np.flatnonzero(edge[1:] == edge[:-1])
-    halfedges = np.stack([order[first], order[first + 1]], axis=1)
-    return halfedges, halfedges // 3
 
 
 def _path(previous: IntArray, vertex: int) -> IntArray:
@@ -215,12 +199,6 @@ def _laplacian(mesh: Mesh) -> sparse.csc_matrix:
     return (sparse.diags_array(np.asarray(weight.sum(axis=1)).reshape(-1)) - weight).tocsc()
 
 
-def _factor(matrix: sparse.csc_matrix) -> Any:
-    """The factors of a symmetric positive definite matrix."""
-    options = {"SymmetricMode": True}
-    return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
-
-
 def _curvature(mesh: Mesh) -> FloatArray:
     """(V,) angle defect at inner vertices, turning angle at those of the boundary."""
     angles = igl.internal_angles(mesh.vertices, mesh.faces)
@@ -250,7 +228,7 @@ def _log_scale(mesh: Mesh, *, flat_loops: bool = True) -> FloatArray:
     if len(inside) == 0:
         return scale
     matrix = _laplacian(mesh)
-    factor = _factor(matrix[inside][:, inside])
+    factor = factored(matrix[inside][:, inside])
     scale[inside] = factor.solve(-_curvature(mesh)[inside])
     if not flat_loops or len(loops) == 1:
         return scale
@@ -269,121 +247,6 @@ def _area_discrepancy(mesh: Mesh, scale: FloatArray) -> float:
     """Σ |share of the mapped area − share of the area| over the faces, predicted from the scale."""
     mapped = mesh.face_areas * np.exp(2 * np.clip(scale[mesh.faces].mean(axis=1), -30, 30))
     return float(np.abs(mapped / mapped.sum() - mesh.face_areas / mesh.face_areas.sum()).sum())
-
-
-def _layout(mesh: Mesh) -> FloatArray:
-    """(V, 2) a flat map of a planar domain."""
-    uv = _scaled_layout(mesh, _log_scale(mesh))
-    flipped = (_signed_areas(uv, mesh.faces) <= 0).mean()
-    if flipped > MOST_FLIPPED:
-        loop = mesh.boundary_loops[0]
-        pins = loop[[0, len(loop) // 2]]
-        try:
-            other = igl.lscm(mesh.vertices, mesh.faces, pins, np.array([[0.0, 0.0], [1.0, 0.0]]))[0]
-        except RuntimeError:  # degenerate triangles
-            return uv
-        if np.isfinite(other).all() and (_signed_areas(other, mesh.faces) <= 0).mean() < flipped:
-            return np.array(other)
-    return uv
-
-
-def _scaled_layout(mesh: Mesh, scale: FloatArray) -> FloatArray:
-    """(V, 2) the map whose log scale is nearest to (V,) one that flattens the mesh.
-
-    The triangles of the scaled edge lengths are turned alike by parallel transport; a Poisson
-    solve makes a map of them (as Sawhney and Crane 2017 with the boundary's lengths given).
-    """
-    faces, count = mesh.faces, len(mesh.faces)
-    stretch = np.exp(np.clip(scale, -5, 5))
-    ends = mesh.vertices[mesh.halfedges]
-    length = np.maximum(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1), 1e-9)
-    length = (length * np.sqrt(stretch[mesh.halfedges].prod(axis=1))).reshape(-1, 3)
-    halfedges, sides = _inner_edges(mesh)
-    heading = _headings(length)
-    turn = heading[halfedges[:, 0]] - heading[halfedges[:, 1]] - np.pi
-    broken = 2.001 * length.max(axis=1) > length.sum(axis=1)  # no triangle has such sides
-    distrust = np.where(broken[sides].any(axis=1), 1000.0, 1.0)
-    angle = _transported(count, sides, turn, distrust, int((~broken).argmax()))
-    cosine, sine = np.cos(angle), np.sin(angle)
-    rotation = np.stack([cosine, -sine, sine, cosine], axis=1).reshape(-1, 2, 2)
-
-    frames, area = _rest_frames(mesh)
-    gradients = np.concatenate([-frames.sum(axis=1, keepdims=True), frames], axis=1)  # (F, 3, 2)
-    size = stretch[faces].prod(axis=1) ** (1 / 3)
-    weight = area / size**2  # errors count relative to the scale
-    blocks = weight[:, None, None] * (gradients @ gradients.transpose(0, 2, 1))
-    places = np.repeat(faces, 3, axis=1).reshape(-1), np.tile(faces, (1, 3)).reshape(-1)
-    matrix = sparse.coo_matrix((blocks.reshape(-1), places), (len(scale),) * 2).tocsc()
-    pull = (weight * size)[:, None, None] * (gradients @ rotation.transpose(0, 2, 1))
-    right = [np.bincount(faces.reshape(-1), pull[:, :, k].reshape(-1)) for k in range(2)]
-    # The map is free to move: one vertex is held.
-    uv: FloatArray = np.zeros((len(scale), 2))
-    uv[1:] = _factor(matrix[1:][:, 1:]).solve(np.stack(right, axis=1)[1:])
-    return uv
-
-
-def _headings(length: FloatArray) -> FloatArray:
-    """(3F,) direction of each halfedge of triangles with sides (F, 3), the first along x."""
-
-    def angle(a: FloatArray, b: FloatArray, opposite: FloatArray) -> FloatArray:
-        return np.arccos(np.clip((a**2 + b**2 - opposite**2) / (2 * a * b), -1, 1))
-
-    one, two, three = length.T
-    at_first, at_second = angle(one, three, two), angle(one, two, three)
-    return np.stack([0 * one, np.pi - at_second, np.pi + at_first], axis=1).reshape(-1)
-
-
-def _transported(
-    count: int, sides: IntArray, turn: FloatArray, distrust: FloatArray, root: int
-) -> FloatArray:
-    """(count,) angles of the faces, of which those at each inner edge differ by `turn` (E,).
-
-    They agree along a tree from `root`; the gaps left at the other edges (a scale flattens a mesh
-    only nearly) are spread by least squares.
-    """
-    shape = (count, count)
-    graph = sparse.coo_matrix((distrust, tuple(sides.T)), shape).tocsr()
-    distance, parent = csgraph.dijkstra(
-        graph, directed=False, indices=root, return_predecessors=True
-    )
-    order = np.argsort(distance, kind="stable")[1:]
-    both = np.concatenate([sides, sides[:, ::-1]]).T
-    turns = sparse.coo_matrix((np.concatenate([turn, -turn]), tuple(both)), shape).tocsr()
-    steps = np.asarray(turns[parent[order], order]).reshape(-1)
-    angle = np.zeros(count)
-    for face, before, step in zip(order, parent[order], steps, strict=True):
-        angle[face] = angle[before] + step
-    gap = turn - (angle[sides[:, 1]] - angle[sides[:, 0]])
-    gap -= 2 * np.pi * np.round(gap / (2 * np.pi))
-    rows = np.repeat(np.arange(len(sides)), 2)
-    signs = np.tile([-1.0, 1.0], len(sides))
-    difference = sparse.coo_matrix((signs, (rows, sides.reshape(-1))), (len(sides), count)).tocsc()
-    trust = sparse.diags_array(1 / distrust)
-    normal = (difference.T @ trust @ difference).tocsc() + 1e-9 * sparse.eye_array(count)
-    return np.asarray(angle + _factor(normal).solve(difference.T @ (trust @ gap)))
-
-
-def _rest_frames(mesh: Mesh) -> tuple[FloatArray, FloatArray]:
-    """(F, 2, 2) inverse edge matrices of the faces in their own planes, and (F,) areas.
-
-    Slivers are thickened to FLATTEST.
-    """
-    corners = mesh.vertices[mesh.faces]
-    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    length = np.maximum(np.linalg.norm(a, axis=1), 1e-12)
-    along = (a * b).sum(axis=1) / length
-    across = np.linalg.norm(np.cross(a, b), axis=1) / length
-    across = np.maximum(across, FLATTEST * np.maximum(length, np.linalg.norm(b, axis=1)))
-    frames = np.zeros((len(corners), 2, 2))
-    frames[:, 0, 0], frames[:, 0, 1] = 1 / length, -along / (length * across)
-    frames[:, 1, 1] = 1 / across
-    return frames, length * across / 2
-
-
-def _signed_areas(uv: FloatArray, faces: IntArray) -> FloatArray:
-    """(F,) signed areas of triangles in the plane."""
-    a, b = uv[faces[:, 1]] - uv[faces[:, 0]], uv[faces[:, 2]] - uv[faces[:, 0]]
-    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
 
 
 def _vertex_jacobians(mesh: Mesh, uv: FloatArray) -> FloatArray:

@@ -110,12 +110,17 @@ the paper in this:
 
 - The map is computed on the bare cloud (`parapoint.reconstruction`, `parapoint.flattening`) in
   place of the warm-up on the hull and the training. Mean angle distortion over all faces, radians:
-  camelhead 0.029 (best published figure 0.088), hand 0.081 (0.145), nefertiti 0.040 (0.117),
-  max planck 0.068 (0.117), fertility 0.090 (0.166), in 7 to 23 seconds of one core. It fails
-  where the reconstruction does: of mannequin-devil it makes a surface with handles, and the map
-  has 0.128 with 7 % of the faces flipped and a third of its area overlapping. Elsewhere the map
-  may overlap itself too: 7 % of fertility's area does, 18 % of nefertiti's. Seed 0; the settings
-  were chosen on these models among others.
+  beetle 0.009 (best published figure 0.037), camelhead 0.030 (0.088), hand 0.094 (0.145),
+  nefertiti 0.052 (0.117; the worst of three seeds), max planck 0.069 (0.117), fertility 0.091
+  (0.166), in 5 to 25 seconds of one core. The settings were chosen on these models among others.
+- The map is bijective on the triangulation (`parapoint.bijection`). Against two linear solves, off
+  the faces that span the seam, nefertiti overlaps itself by 0.6 % of its area in place of 18 %,
+  fertility by 0.03 % in place of 7 %; the area discrepancy is 0.59 in place of 0.81, and 0.39 in
+  place of 0.55.
+- It fails where the triangulation does, which then has handles or parts turned inside out: at thin
+  parts that are coarsely sampled (gargoyle, on which nothing was chosen: 24 handles, 26 % of the
+  faces flipped), and in models that cross themselves (mannequin-devil: 6 % flipped; keenan-ogre:
+  0.7 %, and 6 % of the area overlaps).
 - Cut and Stitch are layers of local features that blend affine maps at anchors
   (`parapoint.anchored`); Unwrap and Wrap drop and add a coordinate. The anchors are the fitted
   points: a map is kept exactly at these and interpolated between. Of nefertiti's 35,000 vertices

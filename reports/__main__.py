@@ -17,6 +17,7 @@ from parapoint import console
     )
 )
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.option("--exports", is_flag=True, help="Every map as a textured OBJ and GLB, too.")
 @click.option(
     "--against",
     metavar="OTHER",
@@ -24,7 +25,7 @@ from parapoint import console
     type=click.Path(path_type=Path),
     help="An earlier results folder, or another machine's; may be given several times.",
 )
-def main(folder: Path, against: tuple[Path, ...]) -> None:
+def main(folder: Path, exports: bool, against: tuple[Path, ...]) -> None:
     """Write the report, or the comparisons, and say where they are."""
     if against:
         from reports import history
@@ -34,7 +35,7 @@ def main(folder: Path, against: tuple[Path, ...]) -> None:
         return
     from reports.report import write
 
-    print(write(folder, jobs=cores()))
+    print(write(folder, jobs=cores(), textured=exports))
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ from reports.galleries import (
     maps,
     models,
 )
-from reports.pictures import known_keys, slug, source_hash
+from reports.pictures import SHEETS, known_keys, slug, source_hash
 from reports.plots import area_convergence, convergence, cost, losses, pareto, singular_values
 from reports.style import STYLE, lighten
 
@@ -215,7 +215,8 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
             partial(cost, contents),
         ),
     ]
-    for case in contents.cases:
+    sheets = contents.cases if len(contents.cases) <= SHEETS else []
+    for case in sheets:
         rows = tuple(row for row in contents.rows if row.case == case)
         if any(row.status == "ok" for row in rows):
             found += [
@@ -291,6 +292,9 @@ def write(folder: Path, drawing: Drawing) -> None:
             for file in files:
                 file.unlink(missing_ok=True)
             return
-        made.savefig(files[1], metadata={"Title": drawing.title})
+        # A sheet of many pictures need not be as fine as a figure: they are most of the weight.
+        sheet = drawing.name.startswith(("maps-", "heat-"))
+        dpi = STYLE["savefig.dpi"] * (0.7 if sheet else 1.0)
+        made.savefig(files[1], dpi=dpi, metadata={"Title": drawing.title})
         lighten(made)
-        made.savefig(files[0], metadata={"CreationDate": None, "Title": drawing.title})
+        made.savefig(files[0], dpi=dpi, metadata={"CreationDate": None, "Title": drawing.title})

@@ -27,12 +27,12 @@ from benchmarks.results import ResultRow, Store
 from parapoint.errors import InputError
 from parapoint.parameterization import Parameterization
 from parapoint.surface import BoolArray, FloatArray, Mesh
-from reports import clouds, render
+from reports import clouds, render, viewer
 from reports.contents import Contents
 from reports.render import Camera, Floats, Image, Scene, View
 
-SIZE, SAMPLES = 560, 2
-"""Longer side of a picture in pixels (shown at about half that), and samples along a pixel."""
+SIZE, SAMPLES = 360, 2
+"""Longer side of a picture in pixels (what the largest figure prints), samples along a pixel."""
 
 FIELDS = 44
 """Fields of the checkerboard along the diagonal of a model's bounding box."""
@@ -213,24 +213,35 @@ def normal_colours(scene: Scene, camera: Camera) -> Floats:
 
 
 MODEL_PICTURES = ("mesh-1", "mesh-2")
-MAP_PICTURES = ("checker-1", "checker-2", "layout", "angle", "angle-uv", "area", "area-uv")
+TEXTURED_PICTURES = ("checker-1", "checker-2", "layout")
+HEAT_PICTURES = ("angle", "angle-uv", "area", "area-uv")
 ARTIST_PICTURES = ("artist-checker-1", "artist-layout")
 CLOUD_PICTURES = ("cloud", "cloud-uv", "dense", "seams")
+SHEETS = 12
+"""Most models of a suite for which each gets figures of its own, and so pictures of its heat."""
+
+VIEWED = "view"
+"""Kind of the file beside the pictures that the viewer reads, of a model and of a map."""
 
 
-def kinds(row: ResultRow) -> tuple[str, ...]:
+def kinds(row: ResultRow, *, with_heat: bool) -> tuple[str, ...]:
     """The pictures of a cell: of points, too, for the one method that sees points alone."""
-    return MAP_PICTURES + CLOUD_PICTURES if row.method == "parapoint" else MAP_PICTURES
+    heat_kinds = HEAT_PICTURES if with_heat else ()
+    return (*TEXTURED_PICTURES, *heat_kinds, *CLOUD_PICTURES * (row.method == "parapoint"))
 
 
 def model_file(case: str, kind: str) -> str:
-    """File name of a picture of a model."""
-    return f"{slug(case)}.{kind}.png"
+    """File name of a picture of a model, or of what the viewer reads."""
+    return f"{slug(case)}.{kind}.{_ending(kind)}"
 
 
 def map_file(row: ResultRow, kind: str) -> str:
-    """File name of a picture of a map."""
-    return f"{slug(row.case)}.{slug(row.method)}.{row.id[:8]}.{kind}.png"
+    """File name of a picture of a map, or of what the viewer reads."""
+    return f"{slug(row.case)}.{slug(row.method)}.{row.id[:8]}.{kind}.{_ending(kind)}"
+
+
+def _ending(kind: str) -> str:
+    return "js" if kind == VIEWED else "webp"
 
 
 def source_hash(*modules: str) -> str:
@@ -250,7 +261,8 @@ def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
     folder.mkdir(parents=True, exist_ok=True)
     record = folder / "keys.json"
     known = known_keys(record)
-    source = source_hash("render", "pictures", "clouds")
+    source = source_hash("render", "pictures", "clouds", "viewer")
+    with_heat = len(contents.cases) <= SHEETS
     work: list[list[ResultRow]] = []
     keys: dict[str, str] = {}
     for case in contents.cases:
@@ -259,12 +271,13 @@ def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
             continue
         todo = []
         latest = rows[-1]
-        wanted = {model_file(case, kind): (latest, "") for kind in MODEL_PICTURES}
+        wanted = {model_file(case, kind): (latest, "") for kind in (*MODEL_PICTURES, VIEWED)}
         if contents.store.reference_path(latest.surface_hash).exists():
             wanted |= {model_file(case, kind): (latest, "artist") for kind in ARTIST_PICTURES}
         for row in rows:
             if row.status == "ok":
-                wanted |= {map_file(row, kind): (row, row.uv_sha256) for kind in kinds(row)}
+                names = (map_file(row, kind) for kind in (*kinds(row, with_heat=with_heat), VIEWED))
+                wanted |= dict.fromkeys(names, (row, row.uv_sha256))
         for name, (row, content) in wanted.items():
             text = f"{source} {row.surface_hash} {content}"
             keys[name] = hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -273,11 +286,13 @@ def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
         if todo:
             work.append(todo)
     faults: list[str] = []
-    for failed, said in _results(contents.store, work, folder, jobs):
+    for failed, said in _results(contents.store, work, folder, with_heat, jobs):
         faults += said
         for name in failed:
             keys.pop(name, None)
-    record.write_text(json.dumps(known | keys, indent=0, sort_keys=True) + "\n")
+    for name in known.keys() - keys.keys():  # of a cell that gave way to a newer one
+        (folder / name).unlink(missing_ok=True)
+    record.write_text(json.dumps(keys, indent=0, sort_keys=True) + "\n")
     return faults
 
 
@@ -291,36 +306,46 @@ def known_keys(record: Path) -> dict[str, str]:
 
 
 def _results(
-    store: Store, work: list[list[ResultRow]], folder: Path, jobs: int
+    store: Store, work: list[list[ResultRow]], folder: Path, with_heat: bool, jobs: int
 ) -> Iterator[tuple[list[str], list[str]]]:
     if jobs <= 1 or len(work) <= 1:
         for rows in work:
-            yield draw_model(store.folder, rows, folder)
+            yield draw_model(store.folder, rows, folder, with_heat)
         return
     with ProcessPoolExecutor(min(jobs, len(work)), mp_context=get_context("spawn")) as pool:
-        pending = [pool.submit(draw_model, store.folder, rows, folder) for rows in work]
+        pending = [pool.submit(draw_model, store.folder, rows, folder, with_heat) for rows in work]
         for done in pending:
             yield done.result()
 
 
-def draw_model(results: Path, rows: list[ResultRow], folder: Path) -> tuple[list[str], list[str]]:
+def draw_model(
+    results: Path, rows: list[ResultRow], folder: Path, with_heat: bool = True
+) -> tuple[list[str], list[str]]:
     """Draw a model and the maps of `rows`; the files that could not be drawn, and why."""
     store = Store(results)
     case = rows[0].case
     files = [model_file(case, kind) for kind in MODEL_PICTURES]
+
+    def files_of(row: ResultRow) -> list[str]:
+        return [map_file(row, kind) for kind in (*kinds(row, with_heat=with_heat), VIEWED)]
+
+    everything = [
+        *files,
+        model_file(case, VIEWED),
+        *(name for row in rows for name in files_of(row)),
+    ]
     try:
         surface = store.surface(rows[-1])
     except InputError as error:
-        files += [map_file(row, kind) for row in rows for kind in kinds(row)]
-        return files, [f"{case}: no pictures: {error}"]
+        return everything, [f"{case}: no pictures: {error}"]
     if not isinstance(surface, Mesh):
-        files += [map_file(row, kind) for row in rows for kind in kinds(row)]
-        return files, [f"{case}: a point cloud; only meshes are drawn"]
+        return everything, [f"{case}: a point cloud; only meshes are drawn"]
     scene = Scene(surface)
     cameras = render.two_cameras(scene)
     views = [scene.view(camera, SIZE, SAMPLES) for camera in cameras]
     for name, view in zip(files, views, strict=True):
         save(meshed(view), folder / name)
+    _write_script(folder / model_file(case, VIEWED), viewer.shape(surface, cameras[0]))
     failed: list[str] = []
     faults: list[str] = []
     try:
@@ -340,7 +365,7 @@ def draw_model(results: Path, rows: list[ResultRow], folder: Path) -> tuple[list
         try:
             result = store.result(row)
         except InputError as error:
-            failed += [map_file(row, kind) for kind in kinds(row)]
+            failed += files_of(row)
             faults.append(f"{case}, {row.method}: no pictures: {error}")
             continue
         fault = ""
@@ -349,26 +374,33 @@ def draw_model(results: Path, rows: list[ResultRow], folder: Path) -> tuple[list
         elif not (found := Map(surface, result)).has_area:
             fault = "the map has no area"
         if fault:
-            failed += [map_file(row, kind) for kind in kinds(row)]
+            failed += files_of(row)
             faults.append(f"{case}, {row.method}: no pictures: {fault}")
             continue
-        made = dict(map_images(scene, views, found))
-        if CLOUD_PICTURES[0] in kinds(row):
+        made = dict(map_images(scene, views, found, with_heat=with_heat))
+        if CLOUD_PICTURES[0] in kinds(row, with_heat=with_heat):
             made |= cloud_images(scene, views[0], found)
         for kind, image in made.items():
             save(image, folder / map_file(row, kind))
+        _write_script(folder / map_file(row, VIEWED), _viewed(found))
     return failed, faults
 
 
-def map_images(scene: Scene, views: list[View], found: Map) -> Mapping[str, Image]:
+def map_images(
+    scene: Scene, views: list[View], found: Map, *, with_heat: bool = True
+) -> Mapping[str, Image]:
     """The pictures of a map by their kind."""
     first, second = views
     layout = Layout(found)
-    angle, area = heat(found.angle, ANGLE_SCALE), heat(found.area, AREA_SCALE)
-    return {
+    images = {
         "checker-1": textured(first, found),
         "checker-2": textured(second, found),
         "layout": layout.image(normal_colours(scene, first.camera)),
+    }
+    if not with_heat:
+        return images
+    angle, area = heat(found.angle, ANGLE_SCALE), heat(found.area, AREA_SCALE)
+    return images | {
         "angle": first.image(angle[first.face]),
         "angle-uv": layout.image(angle),
         "area": first.image(area[first.face]),
@@ -383,6 +415,25 @@ def cloud_images(scene: Scene, view: View, found: Map) -> Mapping[str, Image]:
     return clouds.images(view, uv, found.spanning, colours, FIELDS / scene.size)
 
 
+def _viewed(found: Map) -> dict[str, object]:
+    """A map as the viewer draws it."""
+    return viewer.uv_map(
+        found.mesh,
+        found.parameterization,
+        found.uv,
+        distortion={
+            "angle": (found.angle, *ANGLE_SCALE[1:]),
+            "area": (found.area, *AREA_SCALE[1:]),
+        },
+        spanning=found.spanning,
+        flipped=found.flipped,
+    )
+
+
+def _write_script(path: Path, content: dict[str, object]) -> None:
+    path.write_text(viewer.script(path.name, content), encoding="utf-8")
+
+
 def save(image: npt.NDArray[np.uint8], path: Path) -> None:
-    """Write `image` as a PNG: the same image gives the same bytes."""
-    Images.fromarray(image).save(path, format="PNG", compress_level=4)
+    """Write `image` as WebP, a quarter of a PNG: the same image gives the same bytes."""
+    Images.fromarray(image).save(path, format="WebP", quality=78, method=4)

@@ -119,13 +119,14 @@ def _convergence(
             if len(found) < 2:
                 value = contents.measured.loc[contents.measured["id"] == row.id, metric]
                 found = pd.DataFrame({"seconds": [row.seconds], name: [float(value.iloc[0])]})
-            curves.setdefault(case, []).append((label, found))
+            known = found[np.isfinite(found[name]) & (found["seconds"] > 0)]
+            if len(known):  # a map of points has neither angles nor areas of faces
+                curves.setdefault(case, []).append((label, known))
     if not traced:
         return None
     made, places = small_multiples(len(curves))
     for place, (case, lines) in zip(places, curves.items(), strict=True):
-        for label, found in lines:
-            known = found[np.isfinite(found[name]) & (found["seconds"] > 0)]
+        for label, known in lines:
             place.plot(
                 known["seconds"], known[name], label=label.short, markersize=3.5,
                 **look(contents, label),

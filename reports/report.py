@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from reports import figures, formats, pictures, tables
+from reports import exports, figures, formats, page, pictures, tables
 from reports.contents import contents
-from reports.page import Section, page
 
 
-def write(folder: Path, *, jobs: int) -> Path:
-    """Write the report on the results in `folder` to `folder`/report; the path of its page.
+def write(folder: Path, *, jobs: int, textured: bool = False) -> Path:
+    """Write the report on the results in `folder` to `folder`/report; the path of its index.
 
     report/tables/SUITE/*.tex, .md, .csv; report/figures/SUITE/*.pdf, .png, captions.md and
-    pictures/; report/index.html. What has not changed is not drawn again.
+    pictures/; report/index.html, report/models/SUITE/MODEL.html and what they share in
+    report/assets/; if `textured`, report/exports/SUITE/MODEL/*.obj, .mtl, .png, .glb. What has
+    not changed is not drawn again.
 
     Raises:
         InputError: the folder is missing, holds no results, or is of a newer version.
@@ -27,7 +28,7 @@ def write(folder: Path, *, jobs: int) -> Path:
         drawn_in = report / "figures" / name
         faults = pictures.draw(suite, drawn_in / "pictures", jobs)
         drawn = figures.draw(suite, drawn_in / "pictures", drawn_in, jobs)
-        sections.append(Section(suite, made, drawn, faults))
-    index = report / "index.html"
-    index.write_text(page(folder, sections), encoding="utf-8")
-    return index
+        if textured:
+            faults += exports.write(suite, report)
+        sections.append(page.Section(report, suite, made, drawn, faults))
+    return page.write(report, folder, sections)

@@ -163,7 +163,8 @@ def metric_column(name: str, title: str = "", **given: object) -> Column:
     if name == "seconds":
         return Column("seconds", title or "time [s]", better="lower", digits=2)
     metric = METRICS[name]
-    digits = 4 if metric.unit == "radians" else 0 if name.endswith("_count") else 3
+    counts = name.endswith("_count") or metric.unit == "faces" or metric.weighting == "count"
+    digits = 4 if metric.unit == "radians" else 1 if counts else 3
     column = Column(
         name,
         title or metric.label,

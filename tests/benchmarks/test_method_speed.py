@@ -26,7 +26,7 @@ def test_bare_call_is_the_library_s_part_of_the_method(spec, monkeypatch):
     whole = getattr(library, name)
 
     def counted(*arguments):
-        called.append([np.array(value) for value in arguments[:2]])
+        called.append([np.array(value) for value in arguments[:3]])
         return whole(*arguments)
 
     monkeypatch.setattr(library, name, counted)

@@ -12,11 +12,13 @@ import textwrap
 import time
 from pathlib import Path
 
+import numpy as np
 import psutil
 import pytest
 
 from baselines import registry
 from benchmarks import executors, models, runner, worker
+from benchmarks.metrics import evaluate_points
 from benchmarks.results import ResultRow, Store
 from benchmarks.runner import Summary, run
 from benchmarks.suites import Suite
@@ -541,3 +543,68 @@ def test_a_wild_map_has_no_metrics_but_its_run_ends(tmp_path, monkeypatch):
     assert row.id in summary.unmeasured
     assert Store(tmp_path / "out").metrics()["angle_difference_mean"].isna().all()
     assert json.loads((tmp_path / "out" / "runs.jsonl").read_text())["status"] == "ok"
+
+
+PROJECTION = """
+from dataclasses import dataclass
+from typing import ClassVar
+from parapoint import Parameterization, PointParameterization
+
+@dataclass(frozen=True)
+class Projection:
+    requires: ClassVar[frozenset[str]] = frozenset()
+    def parameterize(self, surface, *, seed):
+        return PointParameterization(surface.points[:, :2])
+
+@dataclass(frozen=True)
+class Seams:
+    requires: ClassVar[frozenset[str]] = frozenset({"seams"})
+    def parameterize(self, surface, *, seed):
+        report = {"seams": len(surface.seams)}
+        return Parameterization(surface.vertices[:, :2], surface.faces, report=report)
+
+@dataclass(frozen=True)
+class Blind:
+    requires: ClassVar[frozenset[str]] = frozenset({"faces"})
+    def parameterize(self, surface, *, seed):
+        report = {"seams": surface.seams is not None}
+        return Parameterization(surface.vertices[:, :2], surface.faces, report=report)
+"""
+
+
+def test_a_noisy_cloud_is_mapped_and_its_points_without_noise_are_scored(tmp_path):
+    plugin = tmp_path / "projection.py"
+    plugin.write_text(PROJECTION)
+    case = "saddle@noise=0.005"
+    trial = Suite("trial", "A trial", (case,), (), (0,))
+    out = tmp_path / "out"
+    run(trial, out, methods=["projection"], plugins=[f"{plugin}:Projection"])
+    store = Store(out)
+    (row,) = store.rows()
+    cloud, exact = store.surface(row), models.exact_points(case)
+    assert np.array_equal(cloud.points, models.load(case).points)
+    values = store.metrics().iloc[0]
+    truth, other = (evaluate_points(points, store.result(row)) for points in (exact, cloud))
+    name = "local_quasi_conformal_mean"
+    assert values[name] == pytest.approx(truth[name])
+    assert truth[name] != pytest.approx(other[name], rel=1e-3)
+    assert list(store.faults()) == []
+
+
+def test_the_seams_of_a_model_s_own_map_reach_the_methods_that_require_them_alone(tmp_path):
+    plugin = tmp_path / "projection.py"
+    plugin.write_text(PROJECTION)
+    try:
+        models.load("fish_control_mesh")
+    except models.MissingModelError as error:
+        pytest.skip(str(error))
+    trial = Suite("trial", "A trial", ("fish_control_mesh", "saddle"), (), (0,))
+    plugins = [f"{plugin}:Seams", f"{plugin}:Blind"]
+    run(trial, tmp_path / "out", methods=["seams", "blind"], plugins=plugins)
+    store = Store(tmp_path / "out")
+    found = {(row.case, row.method): row for row in store.rows()}
+    assert found["saddle", "seams"].status == "skipped"
+    assert "came with a UV map" in found["saddle", "seams"].reason
+    row = found["fish_control_mesh", "seams"]
+    assert row.report == {"seams": len(store.reference(row).seams(store.surface(row)))}
+    assert found["fish_control_mesh", "blind"].report == {"seams": False}

@@ -1,3 +1,4 @@
+import json
 import shutil
 
 import numpy as np
@@ -63,12 +64,16 @@ def test_a_face_without_uv_area_has_the_worst_colour():
 def test_pictures_are_drawn_once_and_again_when_something_changed(results, tmp_path):
     suite = contents(results)[0]
     assert draw(suite, tmp_path, 1) == []
-    files = sorted(path.name for path in tmp_path.glob("*.png"))
+    files = sorted(path.name for path in tmp_path.glob("*.webp"))
     assert len(files) == 3 * 2 + 7 * 7 + 3 * 4
     before = {name: (tmp_path / name).read_bytes() for name in files}
     stamps = {name: (tmp_path / name).stat().st_mtime_ns for name in files}
     (tmp_path / files[0]).unlink()
+    record = tmp_path / "keys.json"
+    record.write_text(json.dumps(json.loads(record.read_text()) | {"gone.webp": "0"}))
+    (tmp_path / "gone.webp").touch()  # of a cell that gave way
     draw(suite, tmp_path, 1)
+    assert not (tmp_path / "gone.webp").exists()
     other = [name for name in files if name.split(".")[0] != files[0].split(".")[0]]
     assert {name: (tmp_path / name).read_bytes() for name in files} == before
     assert all((tmp_path / name).stat().st_mtime_ns == stamps[name] for name in other)
@@ -97,7 +102,7 @@ def test_a_damaged_map_is_told_and_the_rest_drawn(results, tmp_path):
     faults = draw(suite, tmp_path / "pictures", 1)
     assert len(faults) == 1
     assert "damaged" in faults[0]
-    assert len(list((tmp_path / "pictures").glob("*.png"))) == 3 * 2 + 6 * 7 + 3 * 4
+    assert len(list((tmp_path / "pictures").glob("*.webp"))) == 3 * 2 + 6 * 7 + 3 * 4
 
 
 def test_the_artist_s_map_is_drawn_where_a_model_came_with_one(tmp_path):

@@ -53,24 +53,48 @@ def parsed(path: Path) -> Page:
     return page
 
 
-def test_the_page_is_whole_opens_from_disk_and_escapes(reported):
-    index = reported / "report" / "index.html"
-    page = parsed(index)
-    source = index.read_text(encoding="utf-8")
-    assert "<script>alert" not in source
+def is_whole(path: Path) -> Page:
+    """The page `path`, which must point to nothing that is not there, and escape."""
+    page = parsed(path)
+    assert "<script>alert" not in path.read_text(encoding="utf-8")
     assert "<script>alert" in page.text
     for address in page.addresses:
         assert not re.match(r"(https?:)?//", address)
-        if address.startswith("#"):
-            assert address[1:] in page.ids
-        else:
-            assert (index.parent / address).is_file(), address
+        file, _, part = address.partition("#")
+        target = path.parent / file if file else path
+        assert target.is_file(), address
+        assert not part or part in parsed(target).ids
     assert len(page.ids) == len(set(page.ids))
+    return page
+
+
+def test_the_page_is_whole_opens_from_disk_and_escapes(reported):
+    index = reported / "report" / "index.html"
+    page = is_whole(index)
+    source = index.read_text(encoding="utf-8")
     assert "over 10 s" in page.text
     assert "lower (better)" in page.text
     assert "python -m benchmarks run paper" in page.text
-    # The table comes before any picture.
-    assert source.index("<table") < source.index("<img")
+    # The tables come before any figure.
+    assert source.index("<table") < source.index("<figure")
+
+
+def test_a_model_s_page_has_every_method_on_it(reported):
+    report = reported / "report"
+    names = [path.name for path in (report / "models" / "paper").iterdir()]
+    assert len(names) == 3
+    page = is_whole(next((report / "models" / "paper").glob("nefertiti*")))
+    assert "needs a disk" in page.text
+    assert "automatic cut to a disk" in page.text
+    assert "over 10 s" in page.text
+    assert "162 vertices, 320 faces" in page.text
+
+
+def test_an_unchanged_report_is_the_same_to_the_byte(reported):
+    files = [path for path in (reported / "report").rglob("*") if path.is_file()]
+    before = {path: path.read_bytes() for path in files}
+    write(reported, jobs=1)
+    assert {path: path.read_bytes() for path in files} == before
 
 
 def test_every_table_is_there_in_four_formats(reported):
@@ -87,11 +111,16 @@ def test_failed_cells_only_give_a_report_that_says_so(tmp_path):
     with writer.store.writing():
         writer.cell(HAND, sheet(), "lscm", {}, status="failed", reason="it broke", output="Boom")
         writer.cell("gone", None, "lscm", {}, status="skipped", reason="not at hand")
-    page = parsed(write(tmp_path, jobs=1))
+    index = write(tmp_path, jobs=1)
+    page = parsed(index)
     assert "No cell of The supplement's comparison" in page.text
     assert "it broke" in page.text
-    assert "Boom" in page.text
     assert "not at hand" in page.text
+    broken = parsed(index.parent / next(a for a in page.addresses if "hand" in a))
+    assert "it broke" in broken.text
+    assert "Boom" in broken.text
+    assert "no map of this model can be drawn" in broken.text
+    assert "not at hand" in parsed(index.parent / "models/paper/gone.html").text
 
 
 def test_a_half_written_folder_is_reported_without_what_is_lost(results, tmp_path):

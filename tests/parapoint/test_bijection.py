@@ -1,0 +1,63 @@
+import igl
+import numpy as np
+import pytest
+
+from benchmarks.metrics import evaluate
+from parapoint.bijection import BijectionError, bijective_map, tutte
+from parapoint.parameterization import Parameterization
+from parapoint.surface import Mesh
+
+
+def grid(columns: int, rows: int) -> np.ndarray:
+    """(F, 3) faces of a grid of vertices, row by row."""
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    sides = [0, 1, columns + 1], [0, columns + 1, columns]
+    return np.concatenate([corner[:, None] + np.array(side) for side in sides])
+
+
+def ramp() -> Mesh:
+    """One and a half turns of a low spiral ramp: flattened it covers half of itself twice."""
+    turn, radius = np.meshgrid(np.linspace(0, 3 * np.pi, 60), np.linspace(1, 2, 8))
+    turn, radius = turn.ravel(), radius.ravel()
+    points = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), 0.02 * turn])
+    return Mesh(points, grid(60, 8)[:, ::-1])
+
+
+def ring() -> Mesh:
+    """A flat square with a square hole."""
+    x, y = np.meshgrid(np.arange(13.0), np.arange(13.0))
+    points = np.column_stack([x.ravel(), y.ravel(), np.zeros(169)])
+    faces = grid(13, 13)
+    hole = (np.abs(points[faces].mean(axis=1)[:, :2] - 6) < 2).all(axis=1)
+    return Mesh(*igl.remove_unreferenced(points, faces[~hole])[:2])
+
+
+def score(mesh: Mesh, uv: np.ndarray) -> dict[str, float]:
+    return evaluate(mesh, Parameterization(uv, mesh.faces))
+
+
+def test_a_surface_that_would_cover_itself_does_not() -> None:
+    mesh = ramp()
+    loop = mesh.boundary_loops[0]
+    pins = loop[[0, len(loop) // 2]]
+    linear = igl.lscm(mesh.vertices, mesh.faces, pins, np.array([[0.0, 0.0], [1.0, 0.0]]))[0]
+    assert score(mesh, linear)["overlap_area"] > 0.1
+    found = score(mesh, bijective_map(mesh))
+    start = score(mesh, tutte(mesh))
+    assert found["bijective"] == 1
+    assert found["angle_difference_mean"] < start["angle_difference_mean"] / 3
+
+
+def test_a_hole_stays_open_and_a_flat_surface_as_it_is() -> None:
+    mesh = ring()
+    assert len(mesh.boundary_loops) == 2
+    found = score(mesh, bijective_map(mesh))
+    assert found["bijective"] == 1
+    assert found["angle_difference_max"] < 1e-4
+    assert found["area_discrepancy_total"] < 1e-4
+
+
+def test_a_face_without_area_is_refused() -> None:
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 1, 0]])
+    with pytest.raises(BijectionError, match="no area"):
+        bijective_map(Mesh(points, np.array([[0, 1, 2], [0, 2, 3]])))
