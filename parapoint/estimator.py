@@ -23,7 +23,8 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from parapoint.anchored import AnchoredNetworks, Anchors
-from parapoint.components import Chart, Charts, components
+from parapoint.charts import Chart, Charts
+from parapoint.components import components
 from parapoint.errors import InputError
 from parapoint.flattening import flat_map
 from parapoint.losses import DISTORTIONS, EIGENVALUES
