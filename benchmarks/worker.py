@@ -227,8 +227,8 @@ def _outcome(job: dict[str, Any]) -> Outcome:
     try:
         preparation = prepared(whole, method.requires)
         preprocessing = preparation.steps
-        if hasattr(method, "load"):
-            method.load()
+        if hasattr(method, "preload"):
+            method.preload()
         before, wall = os.times(), time.perf_counter()
         maps = preparation.maps(method, job["seed"])
         wall, after = time.perf_counter() - wall, os.times()

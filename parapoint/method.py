@@ -13,8 +13,8 @@ from parapoint.surface import Mesh, PointCloud, Surface
 class Method(Protocol):
     """A parameterization method: a dataclass whose fields are its hyperparameters.
 
-    It may have a method `load()`, called once before `parameterize` is timed: there it imports or
-    starts what is slow to come, and raises MissingError where that is not installed.
+    It may have a method `preload()`, called once before `parameterize` is timed: there it imports
+    or starts what is slow to come, and raises MissingError where that is not installed.
 
     Attributes:
         requires: what the surface must be, words of `REQUIREMENTS`. Empty: a mesh or a point cloud.

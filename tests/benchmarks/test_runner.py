@@ -338,7 +338,7 @@ from parapoint.method import MissingError
 class Guest:
     requires: ClassVar[frozenset[str]] = FACES
 
-    def load(self):
+    def preload(self):
         if not Path({str(tmp_path / "installed")!r}).exists():
             raise MissingError("needs the package guest")
         time.sleep(0.3)
@@ -487,6 +487,14 @@ def test_every_method_gives_the_same_map_in_two_cells_or_says_that_it_does_not(
         assert not registry.method(spec)[1].deterministic
     assert registry.method("parapoint(device=cpu)")[1].deterministic
     assert not registry.method("external(command='{input} {output}')")[1].deterministic
+
+
+def test_the_methods_that_learn_end_well_in_a_cell(tmp_path, monkeypatch):
+    monkeypatch.setattr(runner, "_measure", lambda *_: None)
+    budget = "points=120, subset=100, iterations=2"
+    specs = [f"parapoint(preset=paper, {budget})", f"fam({budget})", f"nuvo({budget})"]
+    ran = run(suite(*specs), tmp_path / "out").ran
+    assert [(row.status, row.reason) for row in ran] == [("ok", "")] * 3
 
 
 def test_a_killed_run_loses_only_the_cell_in_flight(tmp_path):
