@@ -33,7 +33,7 @@ from parapoint.parameterization import Parameterization, PointParameterization, 
 from parapoint.presets import PRESETS, SMOOTH, Preset
 from parapoint.reconstruction import ReconstructionError
 from parapoint.surface import BoolArray, FloatArray, Mesh, PointCloud, Surface
-from parapoint.trainer import PRECISIONS, Step, Trainer, surface_sample
+from parapoint.trainer import PRECISIONS, DivergedError, Step, Trainer, surface_sample
 
 logger = logging.getLogger("parapoint")
 
@@ -177,7 +177,8 @@ class ParaPoint:
         Raises:
             InputError: a parameter is not as said, there are fewer than 100 distinct points, or
                 they lie on a line; the checkpoint is of another run or version.
-            DivergedError: the training diverged, and again with a smaller step.
+            DivergedError: the training diverged, and again with a smaller step, and there is no
+                computed map.
         """
         return self._fit(points, None, checkpoint, callback)
 
@@ -342,19 +343,25 @@ class ParaPoint:
                 trainer.resume(tensors, facts["trainer"])
                 self.trace_ = tuple(TracePoint(*row) for row in facts["trace"])
             begun = time.monotonic() - trainer.seconds
-            for step in trainer.run():
-                if step.losses:
-                    self._record(step, watched)
-                if store is not None:
-                    store.write_each_minute(trainer, self.trace_)
-                if callback is not None:
-                    left = step.seconds * (1 - step.progress) / step.progress
-                    callback(Progress(step, left))
+            try:
+                for step in trainer.run():
+                    if step.losses:
+                        self._record(step, watched)
+                    if store is not None:
+                        store.write_each_minute(trainer, self.trace_)
+                    if callback is not None:
+                        left = step.seconds * (1 - step.progress) / step.progress
+                        callback(Progress(step, left))
+            except DivergedError:
+                if start is None:
+                    raise
+                # Deform alone was trained: the computed map is whole without it.
         if store is not None:
             store.remove()
         self.report_ = self._report(trainer, device, time.monotonic() - begun) | found
         if trainer.divergences:
-            logger.warning("training diverged once and went on with a smaller step")
+            times = "once and went on with a smaller step" if trainer.divergences == 1 else "twice"
+            logger.warning("training diverged %s", times)
         return self
 
     def _fit_each(
