@@ -7,10 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from parapoint.parameterization import Parameterization
+from parapoint.preparation import shelves
 from parapoint.surface import FloatArray, IntArray, Mesh
-
-GAP = 0.01
-"""Space between two maps on a page, in widths of the page."""
 
 
 def by_component(mesh: Mesh, mapped: Callable[[Mesh], Parameterization]) -> Parameterization:
@@ -31,20 +29,7 @@ def by_component(mesh: Mesh, mapped: Callable[[Mesh], Parameterization]) -> Para
         corners[of] = part.corners + count
         maps.append(part.uv)
         count += len(part.uv)
-    return Parameterization(np.concatenate(on_shelves(maps)), corners)
-
-
-def on_shelves(maps: list[FloatArray]) -> list[FloatArray]:
-    """The maps (T, 2) moved onto shelves of a page that is about square, the tallest ones first."""
-    boxes = np.array([np.ptp(uv, axis=0) for uv in maps])
-    width = max(float(np.sqrt(boxes.prod(axis=1).sum())), float(boxes[:, 0].max()))
-    gap = GAP * width
-    placed = list(maps)
-    x = y = shelf = 0.0
-    for row in np.argsort(-boxes[:, 1], kind="stable").tolist():
-        if x > 0 and x + boxes[row, 0] > width:
-            x, y, shelf = 0.0, y + shelf + gap, 0.0
-        placed[row] = maps[row] - maps[row].min(axis=0) + [x, y]
-        x += boxes[row, 0] + gap
-        shelf = max(shelf, float(boxes[row, 1]))
-    return placed
+    low = np.array([uv.min(axis=0) for uv in maps])
+    sizes = np.array([np.ptp(uv, axis=0) for uv in maps])
+    placed = [uv + at for uv, at in zip(maps, shelves(sizes) - low, strict=True)]
+    return Parameterization(np.concatenate(placed), corners)

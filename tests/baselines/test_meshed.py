@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from baselines import registry
 from baselines.flattening import FlatteningError
 from baselines.meshed import carried
-from baselines.packing import by_component, on_shelves
+from baselines.packing import by_component
 from parapoint.method import UnsupportedError
 from parapoint.parameterization import Parameterization
 from parapoint.preparation import prepared
@@ -88,20 +88,6 @@ def test_components_are_mapped_one_by_one_and_do_not_overlap():
     one, other = result.uv[:count], result.uv[count:]
     apart = (one.max(0) < other.min(0)) | (other.max(0) < one.min(0))
     assert apart.any()
-
-
-def test_shelves_hold_every_map_apart_and_fill_a_page_that_is_about_square():
-    rng = np.random.default_rng(1)
-    sizes = rng.uniform(0.2, 1, (40, 2))
-    placed = on_shelves([size * [[0.0, 0.0], [1.0, 1.0]] - 3 for size in sizes])
-    low, high = (np.array([uv[k] for uv in placed]) for k in (0, 1))
-    assert_allclose(high - low, sizes, atol=1e-12)
-    apart = (high[:, None] < low[None]).any(axis=2)
-    apart |= apart.T
-    assert apart[~np.eye(40, dtype=bool)].all()
-    width, height = high.max(axis=0) - low.min(axis=0)
-    assert sizes.prod(axis=1).sum() > 0.6 * width * height
-    assert 0.6 < width / height < 1.6
 
 
 def test_a_face_without_area_gives_the_uv_of_its_nearest_corner():
