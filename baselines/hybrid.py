@@ -1,4 +1,4 @@
-"""SLIM along seams that are not automatic: those that ParaPoint learns, those a model came with."""
+"""One-to-one SLIM along seams: those that ParaPoint learns, the automatic cut, an artist's."""
 
 from __future__ import annotations
 
@@ -77,9 +77,7 @@ class ParaPointSLIM:
     builds_on: ClassVar[tuple[str, ...]] = ("parapoint.estimator", "parapoint.spanning")
 
     def __post_init__(self) -> None:
-        check_iterations(self.iterations)
-        if self.price is not None and not self.price >= 0:
-            raise InputError(f"price must be at least 0 or None, not {self.price}")
+        _check(self.iterations, self.price)
 
     @property
     def deterministic(self) -> bool:
@@ -96,9 +94,7 @@ class ParaPointSLIM:
         """
         if not isinstance(surface, Mesh):
             raise UnsupportedError("needs faces; the surface is a point cloud")
-        used, faces = np.unique(surface.faces, return_inverse=True)
-        mesh = Mesh(surface.vertices[used], faces.reshape(-1, 3))
-        check_triangles(mesh.vertices, mesh.faces)
+        mesh = _sound(surface)
         model = ParaPoint(self.preset, points=self.points, time_budget=self.time_budget)
         learned = model.parameterize(mesh, seed=seed)
         seam = learned_seam(mesh, learned.uv)
@@ -114,17 +110,49 @@ class ParaPointSLIM:
                 if whole.energy <= run.energy + self.price * length:
                     run, seam = whole, np.zeros_like(seam)
             run.lengthen(self.price)
-        report: dict[str, object] = {
-            "energy": ENERGY,
-            "end_energy": run.energy,
-            "start": run.start,
-            "bijective": len(crossing_vertices(run.mesh, run.uv)) == 0,
-            "held_steps": run.held_steps,
+        report = {
+            **run.report(),
             "learned_seam_edges": int(seam.sum()),
-            "branches_added": run.branches,
             "parapoint": dict(learned.report),
         }
         return Parameterization(run.uv, run.mesh.faces, report=report)
+
+
+@dataclass(frozen=True)
+class AutomaticSLIM:
+    """SLIM along the automatic cut, grown and kept one to one: ParaPointSLIM without ParaPoint.
+
+    Held against that one it tells what the learned seam is worth, and what a longer seam is.
+
+    Attributes:
+        iterations: steps of SLIM, at least 1; the longer seam takes more.
+        price: as of `ParaPointSLIM`; None for the automatic cut as it is.
+    """
+
+    iterations: int = 20
+    price: float | None = 0.1
+
+    requires: ClassVar[frozenset[str]] = frozenset({"faces", "disk_after_cut"})
+    packages: ClassVar[tuple[str, ...]] = ("libigl", "shapely")
+
+    def __post_init__(self) -> None:
+        _check(self.iterations, self.price)
+
+    def parameterize(self, surface: Surface, *, seed: int) -> Parameterization:  # noqa: ARG002 (nothing is random)
+        """The map, in the scale of the surface.
+
+        Raises:
+            UnsupportedError: the surface is no disk, with or without holes; no shapely.
+            InputError: a triangle has no area.
+            FlatteningError: Tutte's embedding has flips.
+        """
+        disk = domain(surface)
+        run = _Run(_sound(Mesh(disk.vertices, disk.faces)))
+        run.begin(None)
+        run.improve(self.iterations)
+        if self.price is not None:
+            run.lengthen(self.price)
+        return Parameterization(run.uv, run.mesh.faces, report=run.report())
 
 
 @dataclass(frozen=True)
@@ -292,6 +320,34 @@ class _Run:
                 blocked |= np.isfinite(
                     csgraph.dijkstra(graph, indices=tip, limit=float(distance[tip]) / 2)
                 )
+
+    def report(self) -> dict[str, object]:
+        """What stands beside the map."""
+        return {
+            "energy": ENERGY,
+            "end_energy": self.energy,
+            "start": self.start,
+            "bijective": len(crossing_vertices(self.mesh, self.uv)) == 0,
+            "held_steps": self.held_steps,
+            "branches_added": self.branches,
+        }
+
+
+def _sound(mesh: Mesh) -> Mesh:
+    """The mesh without unreferenced vertices.
+
+    Raises:
+        InputError: a triangle has no area.
+    """
+    check_triangles(mesh.vertices, mesh.faces)
+    used, faces = np.unique(mesh.faces, return_inverse=True)
+    return Mesh(mesh.vertices[used], faces.reshape(-1, 3))
+
+
+def _check(iterations: int, price: float | None) -> None:
+    check_iterations(iterations)
+    if price is not None and not price >= 0:
+        raise InputError(f"price must be at least 0 or None, not {price}")
 
 
 def origin(mesh: Mesh, cut: Mesh) -> IntArray:

@@ -42,6 +42,7 @@ METHODS: dict[str, str] = {
     "meshlab_voronoi": "baselines.meshlab:MeshLabVoronoi",
     "meshlab_triangles": "baselines.meshlab:MeshLabTriangles",
     "parapoint+slim": "baselines.hybrid:ParaPointSLIM",
+    "automatic+slim": "baselines.hybrid:AutomaticSLIM",
     "artist+slim": "baselines.hybrid:ArtistSLIM",
     "meshed": "baselines.meshed:Meshed",
     "external": "baselines.external:External",

@@ -132,7 +132,7 @@ SUITES: dict[str, Suite] = {
             "cuts",
             "SLIM along automatic, learned and artists' seams",
             members("artist", "closed", "genus"),
-            (ISOMETRIC, LEARNED_SEAM, HYBRID, "artist+slim"),
+            (ISOMETRIC, "automatic+slim", LEARNED_SEAM, HYBRID, "artist+slim"),
         ),
         Suite(
             "core",

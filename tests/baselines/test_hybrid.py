@@ -148,6 +148,23 @@ def test_the_hybrid_on_a_torus_is_one_to_one_and_better_than_the_automatic_cut()
     assert energy[0] < energy[1]
 
 
+def test_the_automatic_cut_grows_and_stays_one_to_one_too():
+    mesh = sphere()
+    cut = cut_to_disk(mesh)
+    energies = {}
+    for price in (None, 0.05):
+        result = registry.method(f"automatic+slim(iterations=10, price={price})")[1].parameterize(
+            cut, seed=0
+        )
+        found = evaluate(mesh, result)
+        assert result.report["bijective"]
+        assert found["overlap_area"] == found["flipped_fraction"] == 0
+        assert found["symmetric_dirichlet"] == pytest.approx(result.report["end_energy"], rel=1e-3)
+        energies[price] = found["symmetric_dirichlet"]
+    assert result.report["branches_added"] > 0
+    assert energies[0.05] < energies[None]
+
+
 def test_a_branch_must_pay():
     cap = builtin.sphere_cap(150, rings=10)
     energies = []
