@@ -53,14 +53,15 @@ What a method may count on, and what it must keep:
 - Every random draw comes from `seed`: the same cell gives the same map, bit by bit, on one
   machine. A method that cannot promise it says `deterministic: ClassVar[bool] = False`.
 - Only `parameterize` is timed: import libraries at the top of the file, and what takes seconds to
-  import or start in a method `load(self)`, which is called before the clock. One that need not be
-  installed is imported by `baselines.optional.optional`, so that its rows are `skipped`, say what
-  to install, and are tried again by the next run.
+  import or start in a method `preload(self)`, which is called before the clock. One that need not
+  be installed is imported by `baselines.optional.optional`, so that its rows are `skipped`, say
+  what to install, and are tried again by the next run.
 - Raise `UnsupportedError` for what the method cannot take though `requires` admits it (`skipped`);
   any other error is a `failed` row with its message.
 - `trace` may hold energies and maps on the way; `report` what should stand beside the result.
 - `packages` names the libraries whose versions are part of the method: results are run anew when
-  one changes, as they are when the method's own source does.
+  one changes, as they are when the method's own source does. `builds_on` names modules of other
+  packages whose source counts as its own.
 
 A program that reads and writes OBJ files needs no code; it is run by
 `external(command="tool {input} {output}")`.

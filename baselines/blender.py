@@ -102,7 +102,7 @@ class Waiting:
     Of a surface that comes in several components the first one's start only: the others' count.
     """
 
-    def load(self) -> None:
+    def preload(self) -> None:
         """Start the process that the next map will use.
 
         Raises:

@@ -88,6 +88,11 @@ class NeuralMethod:
         if self.time_budget is not None and not self.time_budget > 0:
             raise InputError(f"time_budget must be a number of seconds, not {self.time_budget}")
 
+    @property
+    def deterministic(self) -> bool:
+        """Whether the same seed gives the same map: not where time ends the run, nor on CUDA."""
+        return self.time_budget is None and not torch.cuda.is_available()
+
     def parameterize(
         self, surface: Surface, *, seed: int
     ) -> Parameterization | PointParameterization:

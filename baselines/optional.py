@@ -27,8 +27,8 @@ class Missing:
 def optional(package: str, install: str) -> Any:
     """The module `package`, or where it cannot be imported a `Missing` in its place.
 
-    Call it when the method's module is imported, or in the method's `load` where the import takes
-    seconds, so that `parameterize` does not time it.
+    Call it when the method's module is imported, or in the method's `preload` where the import
+    takes seconds, so that `parameterize` does not time it.
 
     Args:
         package: name of the module.

@@ -41,6 +41,10 @@ METHODS: dict[str, str] = {
     "meshlab_harmonic": "baselines.meshlab:MeshLabHarmonic",
     "meshlab_voronoi": "baselines.meshlab:MeshLabVoronoi",
     "meshlab_triangles": "baselines.meshlab:MeshLabTriangles",
+    "parapoint+slim": "baselines.hybrid:ParaPointSLIM",
+    "automatic+slim": "baselines.hybrid:AutomaticSLIM",
+    "artist+slim": "baselines.hybrid:ArtistSLIM",
+    "meshed": "baselines.meshed:Meshed",
     "external": "baselines.external:External",
     "parapoint": "parapoint.estimator:ParaPoint",
     "fam": "baselines.fam:FAM",
@@ -159,11 +163,13 @@ def source_hash(made: Method) -> str:
     """Hash of what determines a method's results beside its parameters, the same on any machine.
 
     It covers the source of the method's module and of the modules of the same package that this
-    one imports, directly or not, and the versions of the packages that the class names in
-    `packages`. For ParaPoint it is thus the whole of `parapoint` that it uses. Where the surface
-    may be changed before the method sees it, it covers how.
+    one imports, directly or not, the same of the modules that the class names in `builds_on`, and
+    the versions of the packages that it names in `packages`. For ParaPoint it is thus the whole of
+    `parapoint` that it uses. Where the surface may be changed before the method sees it, it covers
+    how.
     """
-    sources = _sources(sys.modules[type(made).__module__])
+    modules = [type(made).__module__, *getattr(made, "builds_on", ())]
+    sources = {k: v for module in modules for k, v in _sources(sys.modules[module]).items()}
     if made.requires & REPAIRED:
         sources |= _sources(importlib.import_module("parapoint.preparation"))
     digest = hashlib.sha256()

@@ -55,7 +55,7 @@ class UVAtlas:
         if not 0 <= self.max_stretch <= 1:
             raise InputError(f"max_stretch must lie between 0 and 1, not {self.max_stretch}")
 
-    def load(self) -> None:
+    def preload(self) -> None:
         """Import Open3D."""
         open3d()
 

@@ -193,13 +193,30 @@ def score(ctx: click.Context, arguments: tuple[str, ...]) -> None:
     metavar="OUT.png",
     help="Draw how the metrics' time and memory grow with the faces.",
 )
-def speed(figure: Path | None) -> None:
+@click.option(
+    "--race",
+    metavar="CASE",
+    help="Instead: time to quality on a model, against a straightforward implementation.",
+)
+@click.option(
+    "--seconds",
+    type=click.FloatRange(min=0, min_open=True),
+    default=180.0,
+    show_default=True,
+    help="Processor time of each way in the race.",
+)
+def speed(figure: Path | None, race: str | None, seconds: float) -> None:
     """How fast the heavy parts are, measured now: metrics, methods, and ParaPoint's training."""
     from benchmarks.display import print_table
     from benchmarks.method_speed import overhead_table, overheads
     from benchmarks.metric_speed import growth_figure, metric_costs, metric_table
     from benchmarks.speed import training_table
 
+    if race is not None:
+        from benchmarks.straightforward import race_table
+
+        print_table(race_table(race, seconds))
+        return
     if figure is not None and figure.suffix.lower() != ".png":
         raise InputError(f"{figure}: the figure is a PNG; give a name that ends in .png")
     costs = metric_costs()

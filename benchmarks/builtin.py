@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
+import igl
 import numpy as np
 from scipy.spatial import Delaunay
 
-from parapoint.surface import FloatArray, IntArray, Mesh
+from parapoint.surface import FloatArray, IntArray, Mesh, PointCloud
 
 HALF_CYLINDER_LENGTH = 3.0
 CONE_HEIGHT = 2.0
@@ -20,6 +21,8 @@ WAVE_HEIGHT = 0.1
 ROLL_HEIGHT = 4.0
 ROLL_TURNS = (1.0, 2.5)
 TORUS_RADII = (1.0, 0.4)
+SAMPLED_POINTS = 8_000
+DENSITY_RATIO = 10.0
 
 
 def grid_faces(rows: int, columns: int) -> IntArray:
@@ -172,6 +175,44 @@ def torus(resolution: int = 24) -> Mesh:
     index = np.arange(around * across).reshape(around, across)
     closed = np.pad(index, ((0, 1), (0, 1)), mode="wrap")
     return Mesh(points.reshape(-1, 3), closed.reshape(-1)[grid_faces(around + 1, across + 1)])
+
+
+def sampled(
+    mesh: Mesh, *, noise: float = 0.0, is_uneven: bool = False, count: int = SAMPLED_POINTS
+) -> tuple[PointCloud, PointCloud]:
+    """A cloud sampled from a mesh at random, always the same, and where its points belong.
+
+    A noisy point belongs at the nearest place of the mesh: from where it was drawn the noise has
+    moved it along the surface too, which no map can know.
+
+    Args:
+        mesh: what is sampled, by area.
+        noise: standard deviation of the normal noise on each coordinate, as a fraction of the
+            diagonal of the mesh's box.
+        is_uneven: whether the density falls tenfold from one end of the longest axis of the mesh to
+            the other, at an even rate.
+        count: number of points.
+    """
+    rng = np.random.default_rng(20240316)  # any seed; it names these very points
+    corners = mesh.vertices[mesh.faces]
+    weight = mesh.face_areas
+    if is_uneven:
+        centred = corners.mean(axis=1) - corners.mean(axis=(0, 1))
+        along = centred @ np.linalg.svd(centred, full_matrices=False)[2][0]
+        along *= 1.0 if along.max() > -along.min() else -1.0  # the sign of an SVD is free
+        weight = weight * DENSITY_RATIO ** ((along - along.min()) / np.ptp(along))
+    face = rng.choice(len(corners), count, p=weight / weight.sum())
+    u, v = rng.random((2, count))
+    inside = u + v <= 1
+    u, v = np.where(inside, u, 1 - u), np.where(inside, v, 1 - v)
+    first, second, third = corners[face].transpose(1, 0, 2)
+    drawn = first + u[:, None] * (second - first) + v[:, None] * (third - first)
+    if noise == 0:
+        return PointCloud(drawn), PointCloud(drawn)
+    scale = noise * float(np.linalg.norm(np.ptp(mesh.vertices[mesh.referenced], axis=0)))
+    noisy = drawn + scale * rng.standard_normal(drawn.shape)
+    nearest = igl.point_mesh_squared_distance(noisy, mesh.vertices, mesh.faces)[2]
+    return PointCloud(noisy), PointCloud(nearest)
 
 
 BUILTIN: dict[str, Callable[[], Mesh]] = {

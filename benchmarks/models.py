@@ -14,6 +14,7 @@ from __future__ import annotations
 import difflib
 import json
 import os
+import re
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -25,14 +26,16 @@ from urllib.parse import urlsplit
 import platformdirs
 import pooch
 
-from benchmarks.builtin import BUILTIN
+from benchmarks.builtin import BUILTIN, sampled
 from parapoint.errors import InputError
 from parapoint.files import FORMATS, read_surface
-from parapoint.surface import Surface
+from parapoint.surface import Mesh, PointCloud, Surface
 
 MIRROR = "PARAPOINT_DATA"
 """Environment variable that names a folder with the registry's files, such as paper/hand_1.obj."""
 
+MOST_NOISE = 0.1
+"""Most noise that a sampled cloud may have."""
 CONNECT_SECONDS, READ_SECONDS = 5, 60
 
 Claim = Literal["same model", "likely", "stand-in"]
@@ -145,14 +148,19 @@ def canonical_name(case: str) -> str:
 
     Args:
         case: a name, any beginning that only one name has, or a path to a file. A full name goes
-            before a file of that name, a file before a beginning.
+            before a file of that name, a file before a beginning. With "@noise=0.01" or "@uneven"
+            after it: a cloud sampled from that model (`benchmarks.builtin.sampled`).
 
     Raises:
-        InputError: no name or file, or a beginning of several names.
+        InputError: no name or file, or a beginning of several names; no such cloud.
     """
     known = names()
     if case in known or Path(case).is_file():
         return case
+    model, at, how = case.rpartition("@")
+    if at:
+        _sampling(how)
+        return f"{canonical_name(model)}@{how}"
     begun = [name for name in known if case and name.startswith(case)]
     if len(begun) == 1:
         return begun[0]
@@ -163,6 +171,70 @@ def canonical_name(case: str) -> str:
     near = difflib.get_close_matches(case, known, n=3, cutoff=0.4)
     hint = f"the nearest are {', '.join(near)}" if near else "`list cases` names all"
     raise InputError(f"there is no model {case!r}; {hint}")
+
+
+def _sampling(how: str) -> dict[str, Any]:
+    """The arguments of `sampled` that stand after the @ of a case.
+
+    Raises:
+        InputError: they cannot be read.
+    """
+    if how == "uneven":
+        return {"is_uneven": True}
+    found = re.fullmatch(r"noise=(\d*\.?\d+)", how)
+    if found is None or float(found[1]) > MOST_NOISE:
+        raise InputError(
+            f"a cloud is sampled from a model by MODEL@noise=0.01 (a fraction of the diagonal, "
+            f"{MOST_NOISE} at most) or MODEL@uneven, not by @{how}"
+        )
+    return {"noise": float(found[1])}
+
+
+def _is_sampled(name: str) -> bool:
+    """Whether a canonical name is that of a sampled cloud."""
+    return "@" in name and not Path(name).is_file()
+
+
+def is_made_in_memory(case: str) -> bool:
+    """Whether a case is a built-in surface or a sampled cloud, and no file.
+
+    Raises:
+        InputError: as for `canonical_name`.
+    """
+    name = canonical_name(case)
+    return name in BUILTIN or _is_sampled(name)
+
+
+def _model_name(name: str) -> str:
+    """The name of the model that a sampled cloud is made of; of all others the name itself."""
+    return name.rpartition("@")[0] if _is_sampled(name) else name
+
+
+def _sampled(name: str) -> tuple[PointCloud, PointCloud]:
+    """The sampled cloud of a canonical name, and where its points belong on the model.
+
+    Raises:
+        InputError: the model has no faces; as for `load`.
+    """
+    model, _, how = name.rpartition("@")
+    mesh = load(model)
+    if not isinstance(mesh, Mesh):
+        raise InputError(f"{model} has no faces to sample; it is a point cloud already")
+    return sampled(mesh, **_sampling(how))
+
+
+def exact_points(case: str) -> PointCloud | None:
+    """Where the points of a noisy sampled cloud belong, there its maps are scored; else None.
+
+    Raises:
+        InputError: as for `load`.
+        MissingModelError: as for `load`.
+    """
+    name = canonical_name(case)
+    if not _is_sampled(name):
+        return None
+    cloud, exact = _sampled(name)
+    return exact if (cloud.points != exact.points).any() else None
 
 
 def info(case: str) -> Model | None:
@@ -185,19 +257,21 @@ def load(case: str) -> Surface:
     name = canonical_name(case)
     if name in BUILTIN:
         return BUILTIN[name]()
+    if _is_sampled(name):
+        return _sampled(name)[0]
     return read_surface(path(name))
 
 
 def path(case: str) -> Path:
     """Where the file of a model is, hash checked: in the mirror, in the cache, or downloaded now.
 
-    A user's file is where it is. Built-in surfaces have no file.
+    A user's file is where it is; of a sampled cloud it is the model's. Built-in surfaces have none.
 
     Raises:
         InputError: as for `load`; or a built-in surface.
         MissingModelError: as for `load`.
     """
-    name = canonical_name(case)
+    name = _model_name(canonical_name(case))
     if name in BUILTIN:
         raise InputError(f"{name} is made in memory and has no file")
     model = registry().get(name)
@@ -282,7 +356,7 @@ def missing(cases: Iterable[str]) -> dict[str, str]:
     """
     reasons: dict[str, str] = {}
     for case in cases:
-        if canonical_name(case) in BUILTIN:
+        if _model_name(canonical_name(case)) in BUILTIN:
             continue
         try:
             path(case)

@@ -560,8 +560,10 @@ class Store:
         """What the metrics of each row depend on, by its id: map, any reference, their source."""
         source = _metrics_source()
         references = {path.stem for path in (self.folder / "references").glob("*.npz")}
+        exact = {path.stem for path in (self.folder / "exact").glob("*.npz")}
         texts = {
-            row.id: f"{row.id} {row.uv_sha256} {row.surface_hash in references} {source}"
+            row.id: f"{row.id} {row.uv_sha256} {row.surface_hash in references} "
+            f"{row.surface_hash in exact} {source}"
             for row in rows
         }
         return {key: hashlib.sha256(text.encode()).hexdigest()[:32] for key, text in texts.items()}
@@ -571,7 +573,8 @@ class Store:
         if not row.uv_sha256:
             return {}
         try:
-            return measured(self.surface(row), self.result(row), self.reference(row))
+            surface = read_surface(self.scored_path(row.surface_hash))
+            return measured(surface, self.result(row), self.reference(row))
         except InputError as error:
             _log.warning("%s, %s: no metrics: %s", row.case, row.method, error)
             return {}
@@ -583,6 +586,15 @@ class Store:
     def reference_path(self, surface_hash: str) -> Path:
         """Where the map lies that the surface of that hash came with."""
         return self.folder / "references" / f"{surface_hash}.npz"
+
+    def exact_path(self, surface_hash: str) -> Path:
+        """Where the points lie, without their noise, of the cloud of that hash."""
+        return self.folder / "exact" / f"{surface_hash}.npz"
+
+    def scored_path(self, surface_hash: str) -> Path:
+        """Where the surface lies on which a map is scored: the points without noise, if stored."""
+        exact = self.exact_path(surface_hash)
+        return exact if exact.exists() else self.surface_path(surface_hash)
 
     def uv_path(self, row_id: str) -> Path:
         """Where the map of that row lies."""
@@ -681,6 +693,13 @@ class Store:
         with disk_said(path):
             if not path.exists():
                 write_arrays(path, map_arrays(reference))
+
+    def add_exact(self, surface_hash: str, cloud: PointCloud) -> None:
+        """Store the points without noise of a cloud, unless they are there."""
+        path = self.exact_path(surface_hash)
+        with disk_said(path):
+            if not path.exists():
+                write_arrays(path, surface_arrays(cloud))
 
     def surface_hashes(self) -> dict[str, str]:
         """Hashes of surfaces in the store by what they were read from, as `note_surfaces` says."""

@@ -17,7 +17,6 @@ from typing import Any, cast
 
 from baselines import registry
 from benchmarks import environment, executors, models
-from benchmarks.builtin import BUILTIN
 from benchmarks.executors import WORKER_LOST, Executor, Task
 from benchmarks.results import MISSING, SOURCE_CHANGED, ResultRow, Store, identity, plain
 from benchmarks.suites import Suite
@@ -225,13 +224,16 @@ def _measure(
 
     tasks = []
     for row in rows:
-        reference = store.reference_path(row.surface_hash)
-        inputs = {"surface": store.surface_path(row.surface_hash), "uv": store.uv_path(row.id)}
-        if reference.exists():
-            inputs["reference"] = reference
-        tasks.append(Task(limits, inputs, began, ended(row)))
+        inputs = {"surface": store.scored_path(row.surface_hash), "uv": store.uv_path(row.id)}
+        tasks.append(Task(limits, inputs | _reference(store, row), began, ended(row)))
     hands.run(tasks, jobs)
     store.metrics(values)
+
+
+def _reference(store: Store, row: ResultRow) -> dict[str, Path]:
+    """The file of the map that the row's surface came with, as an input; none if none came."""
+    path = store.reference_path(row.surface_hash)
+    return {"reference": path} if path.exists() else {}
 
 
 def _absolute(plugin: str) -> str:
@@ -298,6 +300,8 @@ def _surfaces(store: Store, cases: Sequence[str], summary: Summary) -> dict[str,
             hashes[case] = ""
             continue
         hashes[case] = store.add_surface(surface)
+        if (exact := models.exact_points(case)) is not None:
+            store.add_exact(hashes[case], exact)
         model = models.info(case)
         if model and model.has_uv:
             store.add_reference(hashes[case], read_parameterized(models.path(case))[1])
@@ -311,13 +315,13 @@ def _surfaces(store: Store, cases: Sequence[str], summary: Summary) -> dict[str,
 def _origin(case: str, readers: str) -> str:
     """The content of a case's file and the hash of its readers, as one text; "" for what varies.
 
-    Built-in surfaces have no file, and a .gltf file names others.
+    Built-in surfaces and sampled clouds have no file, and a .gltf file names others.
     """
     model = models.info(case)
     path = Path(case)
     if model:
         return f"{model.sha256} {readers}"
-    if models.canonical_name(case) in BUILTIN or path.suffix.lower() == ".gltf":
+    if models.is_made_in_memory(case) or path.suffix.lower() == ".gltf":
         return ""
     with faults_of(path), path.open("rb") as stream:
         content = hashlib.file_digest(stream, "sha256").hexdigest()
@@ -444,6 +448,7 @@ class _Book:
             self.write(cell, outcome)
 
         inputs = {"surface": self.store.surface_path(cell.row.surface_hash)}
+        inputs |= _reference(self.store, cell.row)
         return Task(job, inputs, lambda: self.progress.started(cell), ended)
 
     def write(self, cell: Cell, outcome: Mapping[str, Any]) -> None:

@@ -43,6 +43,18 @@ FAST = "parapoint(preset=fast, time_budget=120)"
 # Neural maps under one budget: seconds of training, points of a step.
 EQUAL = "points=4096, subset=256, time_budget=300"
 
+HYBRID = "parapoint+slim(time_budget=120)"
+LEARNED_SEAM = "parapoint+slim(time_budget=120, price=None)"
+
+# What a user with a scan would do instead: every reconstruction with every flattening.
+MESHED_METHODS = tuple(
+    f"meshed(reconstruction={reconstruction}, flattening={flattening})"
+    for reconstruction in ("poisson", "ball_pivoting")
+    for flattening in ("xatlas", "lscm", "slim")
+)
+SAMPLED_MODELS = ("camelhead", "bunny_i_f10000", "cowhead_bff", "fairing-cross")
+SAMPLINGS = ("noise=0", "noise=0.005", "noise=0.01", "uneven")
+
 PAPER_CASES = (
     "beetle_igl",
     "mannequin-devil",
@@ -104,7 +116,24 @@ SUITES: dict[str, Suite] = {
         Suite("cad", "CAD parts", members("cad"), (*MESH_METHODS, FAST)),
         Suite("artist", "Models with a UV map of their own", members("artist"), MESH_METHODS),
         Suite("wild", "Defective meshes", members("wild"), (*MESH_METHODS, FAST)),
-        Suite("scans", "Point clouds and noisy scans", members("scans"), (*MESH_METHODS, FAST)),
+        Suite(
+            "scans",
+            "Point clouds and noisy scans",
+            members("scans"),
+            (*MESH_METHODS, *MESHED_METHODS, FAST, PAPER_REDUCED),
+        ),
+        Suite(
+            "noise",
+            "Clouds sampled from disks: noise in fractions of the diagonal, uneven density",
+            tuple(f"{model}@{how}" for model in SAMPLED_MODELS for how in SAMPLINGS),
+            (*MESHED_METHODS, FAST, PAPER_REDUCED),
+        ),
+        Suite(
+            "cuts",
+            "SLIM along automatic, learned and artists' seams",
+            members("artist", "closed", "genus"),
+            (ISOMETRIC, "automatic+slim", LEARNED_SEAM, HYBRID, "artist+slim"),
+        ),
         Suite(
             "core",
             "All well-behaved models",

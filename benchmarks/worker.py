@@ -219,12 +219,16 @@ def _outcome(job: dict[str, Any]) -> Outcome:
     if registry.source_hash(method) != job["source_hash"]:
         return {"status": "failed", "reason": SOURCE_CHANGED}
     whole = read_surface(Path(job["surface"]))
+    if isinstance(whole, Mesh) and "reference" in job and "seams" in method.requires:
+        reference = read_map(Path(job["reference"]))
+        assert isinstance(reference, Parameterization)
+        whole = Mesh(whole.vertices, whole.faces, reference.seams(whole))
     preprocessing = ""
     try:
         preparation = prepared(whole, method.requires)
         preprocessing = preparation.steps
-        if hasattr(method, "load"):
-            method.load()
+        if hasattr(method, "preload"):
+            method.preload()
         before, wall = os.times(), time.perf_counter()
         maps = preparation.maps(method, job["seed"])
         wall, after = time.perf_counter() - wall, os.times()

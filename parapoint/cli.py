@@ -16,6 +16,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
 from parapoint import console
+from parapoint.components import components
 from parapoint.errors import InputError
 from parapoint.files import read_surface, write_obj, write_points
 from parapoint.spanning import opened
@@ -35,6 +36,12 @@ OPTIONS = (
     click.option("--distortion-weight", type=float, help="The paper has 1e-4 for complex shapes."),
     click.option("--eigenvalues", help="singular values of the Jacobian, or of its gram matrix."),
     click.option("--branches", help="both, or one: 3d (3D-2D-3D) or 2d (2D-3D-2D)."),
+    click.option(
+        "--components",
+        default="together",
+        show_default=True,
+        help="One map of all, or of each or the largest component.",
+    ),
     click.option("--seed", type=int, default=0, show_default=True),
     click.option("--device", default="auto", show_default=True, help="auto, cpu or cuda."),
     click.option("--threads", type=int, help="Processor threads."),
@@ -102,11 +109,13 @@ def unwrap(surface: str, out: str, as_json: bool, **settings: Any) -> None:
 
     A mesh written as OBJ gets a checkerboard and is cut at the learned seams: a face whose corners
     lie on both banks stays at the bank of its one short edge, in its true shape, and is not drawn
-    across the plane.
+    across the plane. With --components largest only that one is written.
     """
     _check_target(out)
     given = read_surface(surface)
     model = _fitted(surface, given, settings, checkpoint=None)
+    if model.components == "largest":
+        given = components(given)[0]
     facts = _write(model, given, out, checkerboard())
     _print({**facts, **model.report_}, as_json, f"{out}: {_summary(model)}")
 
@@ -132,9 +141,15 @@ def _fitted(
     from parapoint.estimator import ParaPoint
     from parapoint.trainer import DivergedError
 
-    if isinstance(surface, Mesh) and surface.component_count > 1:
+    if (
+        settings["components"] == "together"
+        and isinstance(surface, Mesh)
+        and surface.component_count > 1
+    ):
         logging.getLogger("parapoint").warning(
-            "%d components: one map is fitted to all of them", surface.component_count
+            "%d components: one map is fitted to all of them; --components each or largest "
+            "fits them apart",
+            surface.component_count,
         )
     model = ParaPoint(**settings)
     try:

@@ -47,7 +47,7 @@ def cut_to_disk(mesh: Mesh) -> Mesh:
         )
     if mesh.topology == "disk":
         return mesh
-    disk = _cut_at(mesh, _disk_cut(mesh))
+    disk = _cut_at(mesh, disk_cut(mesh))
     assert disk.topology == "disk", disk.topology
     return disk
 
@@ -72,7 +72,7 @@ def cut_along(mesh: Mesh, edges: IntArray) -> Mesh:
     unknown = ~(inside & np.isin(_edge_keys(mesh, edges), _edge_keys(mesh, mesh.edges)))
     if unknown.any():
         raise InputError(f"{edges[unknown][0].tolist()} is no edge of the mesh")
-    return _cut_at(mesh, _edge_mask(mesh, edges))
+    return _cut_at(mesh, edge_mask(mesh, edges))
 
 
 def _edge_keys(mesh: Mesh, pairs: IntArray) -> IntArray:
@@ -80,7 +80,7 @@ def _edge_keys(mesh: Mesh, pairs: IntArray) -> IntArray:
     return np.asarray(np.sort(pairs, axis=1) @ [len(mesh.vertices), 1], dtype=np.int64)
 
 
-def _edge_mask(mesh: Mesh, pairs: IntArray) -> BoolArray:
+def edge_mask(mesh: Mesh, pairs: IntArray) -> BoolArray:
     """(E,) which edges of the mesh are among the `pairs` (n, 2) of vertices."""
     return np.asarray(np.isin(_edge_keys(mesh, mesh.edges), _edge_keys(mesh, pairs)), dtype=bool)
 
@@ -110,11 +110,21 @@ def _cut_at(mesh: Mesh, cut: BoolArray) -> Mesh:
     return Mesh(vertices, row[fan].reshape(-1, 3))
 
 
-def _disk_cut(mesh: Mesh) -> BoolArray:
-    """(E,) the edges along which `mesh`, which is no disk, opens to a disk."""
+def edge_lengths(mesh: Mesh) -> FloatArray:
+    """(E,) 3D lengths of the edges, at least 1e-12 of the longest: scipy's graphs drop zeros."""
     ends = mesh.vertices[mesh.edges]
     lengths = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
-    lengths = np.maximum(lengths, 1e-12 * lengths.max() or 1.0)  # scipy's graphs drop zeros
+    return np.asarray(np.maximum(lengths, 1e-12 * lengths.max() or 1.0))
+
+
+def disk_cut(mesh: Mesh, cost: FloatArray | None = None) -> BoolArray:
+    """(E,) the edges along which `mesh`, which is no disk, opens to a disk.
+
+    Args:
+        mesh: connected, manifold, consistently oriented.
+        cost: (E,) positive cost of cutting each edge; its length by default.
+    """
+    lengths = edge_lengths(mesh) if cost is None else cost
     cut = mesh.edge_face_count == 1
     if not cut.any() and mesh.genus == 0:
         return _far_path(mesh, lengths)
@@ -132,7 +142,7 @@ def _disk_cut(mesh: Mesh) -> BoolArray:
     return np.asarray(cut & (mesh.edge_face_count == 2), dtype=bool)
 
 
-def _graph(mesh: Mesh, lengths: FloatArray) -> sparse.csr_matrix:
+def edge_graph(mesh: Mesh, lengths: FloatArray) -> sparse.csr_matrix:
     """The symmetric (V, V) graph of the edges."""
     i, j = mesh.edges.T
     size = len(mesh.vertices)
@@ -142,7 +152,7 @@ def _graph(mesh: Mesh, lengths: FloatArray) -> sparse.csr_matrix:
 
 def _spread(mesh: Mesh, lengths: FloatArray) -> list[int]:
     """ROOTS vertices far from each other, by edge distance."""
-    graph = _graph(mesh, lengths)
+    graph = edge_graph(mesh, lengths)
     roots: list[int] = []
     distance = csgraph.dijkstra(graph, indices=mesh.faces[0, 0])
     while len(roots) < ROOTS:
@@ -155,19 +165,25 @@ def _spread(mesh: Mesh, lengths: FloatArray) -> list[int]:
 
 def _far_path(mesh: Mesh, lengths: FloatArray) -> BoolArray:
     """(E,) the edges of a shortest path between two far vertices, at least two edges long."""
-    graph = _graph(mesh, lengths)
+    graph = edge_graph(mesh, lengths)
     start = mesh.faces[0, 0]
     for _ in range(2):  # the farthest of the farthest
         distance, previous = csgraph.dijkstra(graph, indices=start, return_predecessors=True)
         end = int(np.where(np.isfinite(distance), distance, -1).argmax())
-        start, origin = end, start
-    path = [end]
-    while path[-1] != origin:
-        path.append(int(previous[path[-1]]))
+        start = end
+    path = path_to(previous, end)
     if len(path) == 2:  # one edge opens nothing: go on to a third corner of a face
         face = next(row for row in mesh.faces.tolist() if set(path) <= set(row))
         path += [vertex for vertex in face if vertex not in path]
-    return _edge_mask(mesh, np.stack([path[:-1], path[1:]], axis=1))
+    return edge_mask(mesh, np.stack([path[:-1], path[1:]], axis=1))
+
+
+def path_to(previous: IntArray, vertex: int) -> list[int]:
+    """The vertices from one back to the root of its tree, given each vertex's predecessor (V,)."""
+    path = [vertex]
+    while previous[path[-1]] >= 0:
+        path.append(int(previous[path[-1]]))
+    return path
 
 
 def _arcs(
@@ -180,7 +196,7 @@ def _arcs(
     cut nor tree, and rather crosses edges of long arcs; the edges left over close the system.
     """
     distance, previous, _ = csgraph.dijkstra(
-        _graph(mesh, lengths), indices=sources, return_predecessors=True, min_only=True
+        edge_graph(mesh, lengths), indices=sources, return_predecessors=True, min_only=True
     )
     i, j = mesh.edges.T
     in_tree = (previous[i] == j) | (previous[j] == i)
@@ -209,4 +225,4 @@ def _arcs(
     while len(tips := tips[previous[tips] >= 0]):
         pairs.append(np.stack([tips, previous[tips]], axis=1))
         tips = np.unique(previous[tips])
-    return cut | _edge_mask(mesh, np.concatenate(pairs).astype(np.int64))
+    return cut | edge_mask(mesh, np.concatenate(pairs).astype(np.int64))

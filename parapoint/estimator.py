@@ -23,19 +23,21 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from parapoint.anchored import AnchoredNetworks, Anchors
+from parapoint.charts import Chart, Charts
+from parapoint.components import components
 from parapoint.errors import InputError
 from parapoint.flattening import flat_map
 from parapoint.losses import DISTORTIONS, EIGENVALUES
-from parapoint.networks import ACTIVATIONS, Networks, SubNetworks
+from parapoint.networks import ACTIVATIONS, Networks, SubNetworks, SurfaceNetworks
 from parapoint.parameterization import Parameterization, PointParameterization, TracePoint
 from parapoint.presets import PRESETS, SMOOTH, Preset
 from parapoint.reconstruction import ReconstructionError
 from parapoint.surface import BoolArray, FloatArray, Mesh, PointCloud, Surface
-from parapoint.trainer import PRECISIONS, Step, Trainer, surface_sample
+from parapoint.trainer import PRECISIONS, DivergedError, Step, Trainer, surface_sample
 
 logger = logging.getLogger("parapoint")
 
-FORMAT = 1
+FORMAT = 2
 """Version of saved models and checkpoints."""
 FEWEST_POINTS = 100
 """Distinct points that a fit needs."""
@@ -96,12 +98,16 @@ class ParaPoint:
         warm_up: share of the run that goes to the convex hull.
         precision: "float32" or "bfloat16" (see `Preset`).
         branches: "both", or an ablation: "3d" (3D→2D→3D alone) or "2d" (2D→3D→2D alone).
+        components: "together", one map for the whole surface; "each", one for each component
+            (`parapoint.components` says what that is), side by side in the plane; or "largest",
+            whose map then holds for all points.
         seed: of every random draw.
         device: "auto", "cpu" or "cuda".
         threads: of the processor, None as torch has it.
         preset_: the numbers of the run, a `Preset`; those of "smooth" where a map could not be
             computed for "fast".
         points_: (n, 3) training points.
+        charts_: what the networks of each component are, empty where there is one map.
         networks_: the trained networks.
         centre_, scale_: the points minus `centre_`, over `scale_`, are what the networks see.
         trace_: losses over the run.
@@ -123,6 +129,7 @@ class ParaPoint:
     distortion_weight: float | None = None
     eigenvalues: str | None = None
     branches: str | None = None
+    components: str = "together"
     seed: int = 0
     device: str = "auto"
     threads: int | None = None
@@ -170,7 +177,8 @@ class ParaPoint:
         Raises:
             InputError: a parameter is not as said, there are fewer than 100 distinct points, or
                 they lie on a line; the checkpoint is of another run or version.
-            DivergedError: the training diverged, and again with a smaller step.
+            DivergedError: the training diverged, and again with a smaller step, and there is no
+                computed map.
         """
         return self._fit(points, None, checkpoint, callback)
 
@@ -263,9 +271,10 @@ class ParaPoint:
             "centre": self.centre_.tolist(),
             "scale": self.scale_,
             "report": self.report_,
+            "charts": self.charts_,
             "trace": [[t.iteration, t.seconds, dict(t.values)] for t in self.trace_],
         }
-        _write(Path(folder), "model", {**tensors, "points": torch.from_numpy(self.points_)}, facts)
+        _write(Path(folder), "model", {**tensors, "fitted": torch.from_numpy(self.points_)}, facts)
 
     @classmethod
     def load(cls, folder: str | Path, *, device: str = "auto") -> Self:
@@ -278,8 +287,14 @@ class ParaPoint:
         with _damage_of(Path(folder)):
             model = cls(**{**facts["parameters"], "device": device})
             model.preset_ = _preset_from(facts["preset"])
-            model.points_ = tensors.pop("points").numpy()
-            model.networks_ = _networks(model.preset_, len(tensors.get("cut.anchors", ())))
+            model.points_ = tensors.pop("fitted").numpy()
+            model.charts_ = facts["charts"]
+            anchors = len(tensors.get("cut.anchors", ()))
+            model.networks_ = (
+                Charts([_chart(of) for of in model.charts_], len(model.points_))
+                if model.charts_
+                else _networks(model.preset_, anchors)
+            )
             model.networks_.load_state_dict(tensors)
             model.centre_ = np.array(facts["centre"])
             model.scale_ = float(facts["scale"])
@@ -297,10 +312,15 @@ class ParaPoint:
     ) -> Self:
         """`fit`; the trace gets maps of the points `watched`."""
         self.preset_, device = self._checked()
+        if self.components != "together":
+            parts = components(_surface(surface))
+            if self.components == "each" and len(parts) > 1:
+                return self._fit_each(parts, device, checkpoint, callback)
+            if len(parts) > 1:
+                logger.warning("%d components: the largest is fitted", len(parts))
+            surface = parts[0]
         self.points_ = training_points(surface, self._most_points(), self.seed)
-        low, high = self.points_.min(axis=0), self.points_.max(axis=0)
-        self.centre_ = (low + high) / 2
-        self.scale_ = float(np.linalg.norm(self.points_ - self.centre_, axis=1).max())
+        self._frame()
         cloud = (self.points_ - self.centre_) / self.scale_
         begun = time.monotonic()
         with _threads(self.threads):
@@ -314,8 +334,8 @@ class ParaPoint:
                 networks=start,
                 seconds=time.monotonic() - begun,
             )
-            assert isinstance(trainer.networks, SubNetworks)
-            self.networks_ = trainer.networks
+            self.networks_: SurfaceNetworks = trainer.networks
+            self.charts_: list[dict[str, Any]] = []
             self.trace_: tuple[TracePoint, ...] = ()
             store = None if checkpoint is None else _Checkpoint(Path(checkpoint), self._identity())
             if store is not None and (state := store.read()) is not None:
@@ -323,20 +343,76 @@ class ParaPoint:
                 trainer.resume(tensors, facts["trainer"])
                 self.trace_ = tuple(TracePoint(*row) for row in facts["trace"])
             begun = time.monotonic() - trainer.seconds
-            for step in trainer.run():
-                if step.losses:
-                    self._record(step, watched)
-                if store is not None:
-                    store.write_each_minute(trainer, self.trace_)
-                if callback is not None:
-                    left = step.seconds * (1 - step.progress) / step.progress
-                    callback(Progress(step, left))
+            try:
+                for step in trainer.run():
+                    if step.losses:
+                        self._record(step, watched)
+                    if store is not None:
+                        store.write_each_minute(trainer, self.trace_)
+                    if callback is not None:
+                        left = step.seconds * (1 - step.progress) / step.progress
+                        callback(Progress(step, left))
+            except DivergedError:
+                if start is None:
+                    raise
+                # Deform alone was trained: the computed map is whole without it.
         if store is not None:
             store.remove()
         self.report_ = self._report(trainer, device, time.monotonic() - begun) | found
         if trainer.divergences:
-            logger.warning("training diverged once and went on with a smaller step")
+            times = "once and went on with a smaller step" if trainer.divergences == 1 else "twice"
+            logger.warning("training diverged %s", times)
         return self
+
+    def _fit_each(
+        self,
+        parts: list[Surface],
+        device: str,
+        checkpoint: str | Path | None,
+        callback: Callable[[Progress], None] | None,
+    ) -> Self:
+        """`fit` of each component, with its share of the points and of the time.
+
+        A fit that goes on from a checkpoint begins finished components anew.
+        """
+        logger.warning("%d components: each is fitted", len(parts))
+        sizes = np.array([len(_coordinates(part, 3)) for part in parts])
+        models = []
+        for k, (part, share) in enumerate(zip(parts, sizes / sizes.sum(), strict=True)):
+            budget = None if self.time_budget is None else self.time_budget * float(share)
+            count = max(FEWEST_POINTS, round(self.preset_.points * float(share)))
+            own = dataclasses.replace(self, components="together", points=count, time_budget=budget)
+            folder = None if checkpoint is None else Path(checkpoint) / f"component-{k}"
+            models.append(own.fit(part, checkpoint=folder, callback=callback))
+            if folder is not None and folder.is_dir():
+                folder.rmdir()
+        self.points_ = np.concatenate([model.points_ for model in models])
+        self._frame()
+        charts = [
+            Chart(m.networks_, m.points_, m.transform(m.points_), m.centre_, m.scale_)
+            for m in models
+        ]
+        joined = Charts([chart.networks for chart in charts], len(self.points_))
+        joined.hold(charts, self.centre_, self.scale_)
+        self.networks_ = joined.to(device)
+        self.charts_ = [
+            {"preset": dataclasses.asdict(m.preset_), "anchors": _anchor_count(m.networks_)}
+            for m in models
+        ]
+        self.trace_ = models[0].trace_
+        self.report_ = {
+            **models[0].report_,
+            "points": len(self.points_),
+            "components": len(models),
+            "iterations": sum(int(str(m.report_["iterations"])) for m in models),
+            "seconds": round(sum(float(str(m.report_["seconds"])) for m in models), 3),
+        }
+        return self
+
+    def _frame(self) -> None:
+        """`centre_` and `scale_` of `points_`: centre of the box at 0, largest norm 1."""
+        self.centre_ = (self.points_.min(axis=0) + self.points_.max(axis=0)) / 2
+        self.scale_ = float(np.linalg.norm(self.points_ - self.centre_, axis=1).max())
 
     def _most_points(self) -> int:
         """Most training points: the preset's, or what a map can be computed of in the budget."""
@@ -418,6 +494,7 @@ class ParaPoint:
             ("eigenvalues", EIGENVALUES),
             ("precision", PRECISIONS),
             ("branches", ("both", "3d", "2d")),
+            ("components", ("together", "each", "largest")),
         ):
             value = getattr(self, name)
             if value is not None and value not in choices:
@@ -544,6 +621,20 @@ def _networks(preset: Preset, anchors: int, seed: int = 0) -> SubNetworks:
     if preset.is_computed:
         return AnchoredNetworks(anchors, *sizes, generator)
     return Networks(*sizes, generator)
+
+
+def _anchor_count(networks: SurfaceNetworks) -> int:
+    return len(networks.cut.anchors) if isinstance(networks, AnchoredNetworks) else 0
+
+
+def _chart(facts: dict[str, Any]) -> SurfaceNetworks:
+    """Networks of one component, about to be filled with saved weights."""
+    return _networks(_preset_from(facts["preset"]), facts["anchors"])
+
+
+def _surface(given: npt.ArrayLike | Surface) -> Surface:
+    """A surface, or the cloud of the finite rows of an array."""
+    return given if isinstance(given, Mesh | PointCloud) else PointCloud(_finite_rows(given))
 
 
 def _preset_from(facts: dict[str, Any]) -> Preset:

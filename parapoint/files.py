@@ -39,6 +39,9 @@ FORMATS: dict[str, Callable[[bytes, Path], Content]] = {
 }
 """Reader of each file name ending; it gets the bytes and the folder of the file."""
 
+ROWS_WRITTEN = 65_536
+"""Points written at a time, which bounds the memory that their text takes beside them."""
+
 UV_FORMATS = (".obj", ".glb", ".gltf")
 
 logger = logging.getLogger("parapoint")
@@ -314,15 +317,23 @@ def _write_ply_points(file: IO[bytes], columns: dict[str, FloatArray]) -> None:
         "end_header\n",
     ]
     file.write("\n".join(header).encode())
-    file.write(np.concatenate(list(columns.values()), axis=1).astype("<f8").tobytes())
+    for rows in _slices(len(columns["points"])):
+        part = [values[rows] for values in columns.values()]
+        file.write(np.concatenate(part, axis=1).astype("<f8").tobytes())
 
 
 def _write_obj_points(file: IO[bytes], columns: dict[str, FloatArray]) -> None:
     """OBJ without faces: row k of v, vn and vt is point k."""
     keys = {"points": "v", "normals": "vn", "uv": "vt"}
     for name, values in columns.items():
-        rows = (" ".join(map(repr, row)) for row in values.tolist())
-        file.write("".join(f"{keys[name]} {row}\n" for row in rows).encode())
+        for rows in _slices(len(values)):
+            lines = (" ".join(map(repr, row)) for row in values[rows].tolist())
+            file.write("".join(f"{keys[name]} {line}\n" for line in lines).encode())
+
+
+def _slices(count: int) -> Iterator[slice]:
+    """Rows written at a time."""
+    return (slice(k, k + ROWS_WRITTEN) for k in range(0, count, ROWS_WRITTEN))
 
 
 @contextmanager

@@ -6,15 +6,15 @@ from collections.abc import Callable
 from typing import ClassVar, Protocol, runtime_checkable
 
 from parapoint.parameterization import Parameterization, PointParameterization
-from parapoint.surface import PointCloud, Surface
+from parapoint.surface import Mesh, PointCloud, Surface
 
 
 @runtime_checkable
 class Method(Protocol):
     """A parameterization method: a dataclass whose fields are its hyperparameters.
 
-    It may have a method `load()`, called once before `parameterize` is timed: there it imports or
-    starts what is slow to come, and raises MissingError where that is not installed.
+    It may have a method `preload()`, called once before `parameterize` is timed: there it imports
+    or starts what is slow to come, and raises MissingError where that is not installed.
 
     Attributes:
         requires: what the surface must be, words of `REQUIREMENTS`. Empty: a mesh or a point cloud.
@@ -66,6 +66,14 @@ REQUIREMENTS: dict[str, Callable[[Surface], str | None]] = {
     "connected": _not_a_mesh,
     "disk": _not_a_disk,
     "disk_after_cut": _not_a_mesh,
+    "seams": lambda surface: (
+        None
+        if isinstance(surface, Mesh) and surface.seams is not None
+        else "needs a mesh that came with a UV map, for its seams"
+    ),
+    "points": lambda surface: (
+        "takes a point cloud; the surface is a mesh" if isinstance(surface, Mesh) else None
+    ),
     "cuda": _cuda_missing,
 }
 """Each word of `Method.requires`: the reason why a surface cannot meet it, or None.
@@ -74,7 +82,8 @@ What is not `manifold` (at most two faces at an edge, one fan at a vertex), `ori
 faces turn alike) or `connected` is made so before the method sees it, the same way for every
 method, and the row says how (`parapoint.preparation`). `disk` takes a disk as it is and nothing
 else. `disk_after_cut` asks for all of these and takes what is cut to a disk: a surface that is one,
-with or without holes, comes as it is.
+with or without holes, comes as it is. `seams` admits meshes that came with a UV map, and the method
+finds in `Mesh.seams` where that is cut; no other method is shown them. `points` takes clouds.
 """
 
 REPAIRED = frozenset({"manifold", "oriented", "connected", "disk_after_cut"})

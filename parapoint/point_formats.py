@@ -21,7 +21,7 @@ def table(lines: list[bytes], columns: tuple[int, ...]) -> FloatArray:
     """(n, len(columns)) numbers in these columns of text lines; empty for no lines."""
     if not lines:
         return np.zeros((0, len(columns)))
-    text = [line.decode("latin-1") for line in lines]
+    text = (line.decode("latin-1") for line in lines)  # no second copy of millions of lines
     return np.loadtxt(text, comments="#", usecols=columns, ndmin=2, dtype=np.float64)
 
 
@@ -64,6 +64,8 @@ def las(data: bytes) -> Content:
 
     if data[:4] != b"LASF":
         raise InputError("has no LAS header")
+    if data[24:25] != b"\x01":  # laspy goes by the minor version alone
+        raise InputError(f"is of LAS version {data[24]}.{data[25]}; 1.0 to 1.4 are read")
     # laspy makes room for whatever the header announces, be it four thousand million points.
     start, records, kind, width, points = struct.unpack_from("<IIBHI", data, 96)
     extended = 0

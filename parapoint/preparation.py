@@ -302,11 +302,11 @@ def _packed(
         scaled = uv * np.sqrt(size / uv_area if uv_area > 0 else 1.0)
         placed.append(scaled - scaled[chart.corners].min(axis=(0, 1)))
     sizes = [uv[chart.corners].max(axis=(0, 1)) for uv, chart in zip(placed, charts, strict=True)]
-    corner = _shelves(np.array(sizes))
+    corner = shelves(np.array(sizes))
     return np.concatenate([uv + at for uv, at in zip(placed, corner, strict=True)])
 
 
-def _shelves(sizes: FloatArray) -> FloatArray:
+def shelves(sizes: FloatArray) -> FloatArray:
     """(N, 2) lower left corners of boxes (N, 2) set on shelves, the highest first."""
     gap = GAP * float(np.sqrt(sizes.prod(axis=1).sum()))
     sizes = sizes + gap

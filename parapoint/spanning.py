@@ -1,9 +1,12 @@
-"""The faces that span a learned seam, and the map with them laid to one bank of it."""
+"""The faces that span a learned seam: laid to one bank of it, or cut along a path of edges."""
 
 from __future__ import annotations
 
+import igl
 import numpy as np
+from scipy.sparse import csgraph
 
+from parapoint.cutting import disk_cut, edge_graph, edge_lengths, edge_mask, path_to
 from parapoint.parameterization import Parameterization
 from parapoint.surface import BoolArray, FloatArray, IntArray, Mesh
 
@@ -11,6 +14,12 @@ LENGTH = 0.01
 """Shortest spanning edge, in sides of the map's square box: T_cut of the paper."""
 STRETCH = 5.0
 """How many times more than the edges around either end a spanning edge is stretched."""
+IN_BAND = 0.1
+"""Cost of a cut among the faces that span the seam, as a fraction of its cost elsewhere."""
+SHORTEST_BRANCH = 4
+"""Edges of the shortest branch of a seam that is followed."""
+ROUNDS = 5
+"""How often the vertices of flipped faces are placed anew."""
 
 
 def spanning_edges(mesh: Mesh, uv: FloatArray) -> BoolArray:
@@ -33,6 +42,98 @@ def spanning_edges(mesh: Mesh, uv: FloatArray) -> BoolArray:
     box = np.ptp(uv[mesh.referenced], axis=0).max()
     calm = np.minimum(quartile[start], quartile[end])
     return np.asarray((length > LENGTH * box) & (stretch > STRETCH * calm))
+
+
+def spanning_faces(mesh: Mesh, uv: FloatArray) -> BoolArray:
+    """(F,) the faces with an edge that spans the seam of a map with one uv (V, 2) a vertex."""
+    spans = spanning_edges(mesh, uv)[mesh.edge_of_halfedge]
+    return np.asarray(spans.reshape(-1, 3).any(axis=1))
+
+
+def learned_seam(mesh: Mesh, uv: FloatArray) -> BoolArray:
+    """(E,) a clean cut along the seam that a map with one uv (V, 2) for each vertex tears at.
+
+    The spanning faces form a band along the seam, where edges are cheap to cut. A closed surface
+    or one with handles is opened by the cheapest cut to a disk (a sphere along the longest path in
+    the band); then one branch after another is led from the cut or the boundary to what is left
+    farthest of the band. Branches only start where it is open already, so that the surface stays in
+    one piece and, once it is a disk, a disk.
+
+    Args:
+        mesh: connected, manifold, consistently oriented.
+        uv: (V, 2) the map.
+    """
+    band = np.zeros(len(mesh.edges), dtype=bool)
+    band[mesh.edge_of_halfedge.reshape(-1, 3)[spanning_faces(mesh, uv)]] = True
+    lengths = edge_lengths(mesh)
+    cost = np.where(band, IN_BAND, 1.0) * lengths
+    inner = mesh.edge_face_count == 2
+    cut = ~inner
+    if mesh.genus > 0:
+        cut = cut | disk_cut(mesh, cost)
+    elif not cut.any():
+        cut = _longest_path(mesh, cost, band) if band.any() else disk_cut(mesh)
+    ends = np.unique(mesh.edges[band])
+    graph = edge_graph(mesh, cost)
+    while len(ends):
+        distance, previous, _ = csgraph.dijkstra(
+            graph, indices=np.unique(mesh.edges[cut]), return_predecessors=True, min_only=True
+        )
+        tip = int(ends[distance[ends].argmax()])
+        if distance[tip] < SHORTEST_BRANCH * IN_BAND * lengths.mean():
+            break
+        path = path_to(previous, tip)
+        cut = cut | edge_mask(mesh, np.stack([path[:-1], path[1:]], axis=1))
+    return np.asarray(cut & inner)
+
+
+def _longest_path(mesh: Mesh, cost: FloatArray, band: BoolArray) -> BoolArray:
+    """(E,) a path between two far vertices of the largest part of the band (E,)."""
+    graph = edge_graph(mesh, np.where(band, cost, 0.0))
+    _, label = csgraph.connected_components(graph, directed=False)
+    end = int((label == np.bincount(label).argmax()).argmax())
+    for _ in range(2):  # the farthest of the farthest
+        distance, previous = csgraph.dijkstra(graph, indices=end, return_predecessors=True)
+        end = int(np.where(np.isfinite(distance), distance, -1).argmax())
+    path = path_to(previous, end)
+    if len(path) < 3:  # one edge opens nothing
+        return disk_cut(mesh)
+    return edge_mask(mesh, np.stack([path[:-1], path[1:]], axis=1))
+
+
+def unfolded(mesh: Mesh, uv: FloatArray, disk: Mesh) -> FloatArray:
+    """(V', 2) the map with every vertex of the cut mesh on its own bank of the seam.
+
+    Vertices of faces that do not span keep their uv. All others, which lie at the far bank or on
+    neither, and those of faces that are flipped, are placed where the map is most nearly conformal.
+
+    Args:
+        mesh: the surface.
+        uv: (V, 2) its map.
+        disk: the mesh cut along `learned_seam`, without unreferenced vertices.
+
+    Raises:
+        RuntimeError: the linear system is singular.
+    """
+    origin = np.empty(len(disk.vertices), dtype=np.int64)
+    origin[disk.faces] = mesh.faces
+    sound = ~spanning_faces(mesh, uv)
+    images = uv[origin]
+    if _doubled_areas(images[disk.faces[sound]]).sum() < 0:
+        images = images * [1.0, -1.0]
+    known = np.zeros(len(origin), dtype=bool)
+    known[disk.faces[sound]] = True
+    placed = images
+    for _ in range(ROUNDS):
+        rows = np.flatnonzero(known)
+        if len(rows) < 2:
+            break
+        placed = igl.lscm(disk.vertices, disk.faces, rows, np.ascontiguousarray(images[rows]))[0]
+        flipped = _doubled_areas(placed[disk.faces]) <= 0
+        if not flipped.any():
+            break
+        known[disk.faces[flipped]] = False
+    return np.asarray(placed)
 
 
 def opened(mesh: Mesh, uv: FloatArray) -> Parameterization:

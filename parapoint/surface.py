@@ -74,6 +74,8 @@ class Mesh:
     Attributes:
         vertices: (V, 3) float64 positions, finite. Unreferenced and duplicate vertices are kept.
         faces: (F, 3) int64 rows of `vertices`, at least one face.
+        seams: (S, 2) int64, edges along which a map that came with the mesh is cut; None if none
+            came. Only a method that `requires` seams looks at them.
 
     Raises:
         InputError: a shape, a value or an index is not as said.
@@ -81,6 +83,7 @@ class Mesh:
 
     vertices: FloatArray
     faces: IntArray
+    seams: IntArray | None = None
 
     def __post_init__(self) -> None:
         vertices = read_only(self.vertices, np.float64, "vertices", 3)
@@ -95,6 +98,8 @@ class Mesh:
             )
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "faces", faces)
+        if self.seams is not None:
+            object.__setattr__(self, "seams", read_only(self.seams, np.int64, "seams", 2))
 
     @cached_property
     def halfedges(self) -> IntArray:

@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from parapoint.cutting import cut_along
+from parapoint.cutting import cut_along, disk_cut
 from parapoint.method import REQUIREMENTS, Method, MissingError, UnsupportedError
 from parapoint.parameterization import Parameterization, PointParameterization
 from parapoint.preparation import prepared
@@ -83,12 +83,14 @@ def sample_surfaces() -> dict[str, Surface]:
         np.concatenate([disk.vertices, disk.vertices + np.array([3.0, 0.0, 0.0])]),
         np.concatenate([disk.faces, disk.faces + len(disk.vertices)]),
     )
+    ball = sphere()
+    seamed = Mesh(ball.vertices, ball.faces, ball.edges[disk_cut(ball)])
     plane = np.random.default_rng(SEED).uniform(-1, 1, (160, 2))
     return {
         "a disk of irregular triangles": disk,
         "a disk with unreferenced and duplicate vertices": littered,
         "a disk with a hole": holed,
-        "a sphere": sphere(),
+        "a sphere with seams": seamed,
         "two components": two,
         "a defective mesh": defective(),
         "a point cloud": PointCloud(np.column_stack([plane, 0.3 * plane[:, 0] ** 2])),

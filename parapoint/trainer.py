@@ -288,9 +288,9 @@ class Trainer:
                 self._good = deepcopy(self._state())
             return
         self.divergences += 1
+        self._restore(self._good)
         if self.divergences > 1:
             raise DivergedError("training diverged twice, the second time with a smaller step")
-        self._restore(self._good)
 
     def _fits(self, seconds: float) -> bool:
         """Whether a step of this length still ends within the time budget."""

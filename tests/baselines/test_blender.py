@@ -102,7 +102,7 @@ def test_options_reach_the_operator(stand_in, spec, operator, options):
 def test_process_is_started_before_the_clock_and_used_once(stand_in):
     stand_in(STAND_IN.format(body="pass"))
     method = registry.method("blender_angle_based")[1]
-    method.load()
+    method.preload()
     (waiting,) = blender._waiting
     assert waiting.process.poll() is None
     method.parameterize(irregular_disk(), seed=0)
@@ -134,7 +134,7 @@ def test_without_blender_it_is_said_how_to_get_it(name, monkeypatch):
     method = registry.method(name)[1]
     monkeypatch.delenv(blender.INTERPRETER, raising=False)
     with pytest.raises(MissingError, match="nox -s bench -- --with blender"):
-        method.load()
+        method.preload()
     monkeypatch.setenv(blender.INTERPRETER, "/nowhere/python")
     with pytest.raises(MissingError, match="there is no program /nowhere/python"):
         method.parameterize(irregular_disk(), seed=0)

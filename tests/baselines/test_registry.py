@@ -132,6 +132,14 @@ def test_source_hash_follows_the_method_s_own_modules_and_its_libraries(monkeypa
     assert registry.source_hash(SLIM()) != hashes["slim"]
 
 
+def test_source_hash_follows_what_a_method_builds_on(monkeypatch):
+    name, made = registry.method("parapoint+slim")
+    assert name == "parapoint+slim"
+    before = registry.source_hash(made)
+    monkeypatch.setattr(type(made), "builds_on", ())
+    assert registry.source_hash(made) != before
+
+
 def test_source_hash_covers_the_preparation_of_those_that_need_one(monkeypatch):
     def hashes():
         return [registry.source_hash(registry.method(name)[1]) for name in ("lscm", "xatlas")]

@@ -2,6 +2,7 @@
 
 from itertools import pairwise
 
+import igl
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -11,10 +12,12 @@ from benchmarks.builtin import (
     BUILTIN,
     ROLL_HEIGHT,
     ROLL_TURNS,
+    SAMPLED_POINTS,
     WAVE_HEIGHT,
     cone,
     half_cylinder,
     saddle,
+    sampled,
     sphere,
     sphere_cap,
     swiss_roll,
@@ -138,3 +141,34 @@ def test_surfaces_face_outwards():
         mesh = BUILTIN[name]()
         a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
         assert np.cross(b - a, c - a)[:, 2].min() > 0
+
+
+def test_a_sampled_cloud_lies_on_the_mesh_and_its_noise_is_as_said():
+    mesh = Mesh(wavy_sheet().vertices * [1, 1, 0], wavy_sheet().faces)
+    cloud, exact = sampled(mesh, noise=0.01)
+    assert cloud.points.shape == (SAMPLED_POINTS, 3)
+    squared, _, _ = igl.point_mesh_squared_distance(exact.points, mesh.vertices, mesh.faces)
+    assert_allclose(squared, 0, atol=1e-20)
+    diagonal = np.linalg.norm(np.ptp(mesh.vertices, axis=0))
+    # Straight up from a flat mesh; of 8,000 numbers the deviation is known to 1 %.
+    offset = cloud.points - exact.points
+    assert_allclose(offset[:, 2].std(), 0.01 * diagonal, rtol=0.04)
+    inside = (np.abs(cloud.points[:, :2] - 0.5) < 0.5).all(axis=1)
+    assert_allclose(offset[inside, :2], 0, atol=1e-12)
+    again, _ = sampled(mesh, noise=0.01)
+    assert_array_equal(cloud.points, again.points)
+    clean, same = sampled(mesh)
+    assert_array_equal(clean.points, same.points)
+    assert_allclose(clean.points[:, 2], 0)
+    assert len(np.unique(clean.points, axis=0)) == SAMPLED_POINTS
+
+
+def test_a_sampled_cloud_is_even_or_falls_tenfold():
+    mesh = half_cylinder()  # long axis: z, 3 long
+    even, uneven = (sampled(mesh, is_uneven=is_uneven)[0] for is_uneven in (False, True))
+    count = [np.histogram(cloud.points[:, 2], 3, (0, 3))[0] for cloud in (even, uneven)]
+    assert_allclose(count[0] / SAMPLED_POINTS, 1 / 3, rtol=0.06)
+    ratio = count[1][[0, 1]] / count[1][[1, 2]]
+    # A third of the way is a factor of the cube root of ten, in one direction or the other.
+    assert_allclose(np.abs(np.log10(ratio)), 1 / 3, atol=0.06)
+    assert np.sign(np.log10(ratio)).tolist() in ([1, 1], [-1, -1])

@@ -10,6 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks import fuzzing
+from parapoint.errors import InputError
+from parapoint.files import read_surface
 
 HOSTILE = [
     b"",
@@ -73,6 +75,14 @@ ANNOUNCED = {
 @pytest.mark.parametrize("target", ANNOUNCED)
 def test_a_header_that_announces_a_million_million_takes_no_memory(target):
     fuzzing.guarded(fuzzing.TARGETS[target], ANNOUNCED[target])
+
+
+def test_las_of_a_version_that_is_none_is_refused(tmp_path):
+    """Before, laspy made room for the points that its header announced: 15 GB."""
+    seed = fuzzing.seeds("las")[0]
+    (tmp_path / "a.las").write_bytes(seed[:24] + b"\x03\x02" + seed[26:] + bytes(200))
+    with pytest.raises(InputError, match=r"LAS version 3\.2"):
+        read_surface(tmp_path / "a.las")
 
 
 def test_a_target_that_takes_too_long_or_grows_is_found(monkeypatch):

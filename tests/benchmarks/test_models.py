@@ -6,9 +6,11 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import igl
 import numpy as np
 import pytest
 import requests
+from numpy.testing import assert_allclose
 
 from benchmarks import models
 from benchmarks.builtin import BUILTIN
@@ -251,3 +253,45 @@ def test_a_mirror_that_is_no_folder_is_said(no_network, monkeypatch, tmp_path):
     with pytest.raises(InputError, match="which is no folder"):
         models.load("camelhead")
     assert no_network == []
+
+
+def test_sampled_clouds_are_cases():
+    assert models.canonical_name("swiss@noise=0.01") == "swiss_roll@noise=0.01"
+    cloud = models.load("swiss_roll@noise=0.01")
+    exact = models.exact_points("swiss_roll@noise=0.01")
+    assert isinstance(cloud, PointCloud)
+    assert (cloud.points != exact.points).any()
+    roll = models.load("swiss_roll")
+    squared = igl.point_mesh_squared_distance(exact.points, roll.vertices, roll.faces)[0]
+    assert_allclose(squared, 0, atol=1e-20)
+    assert models.exact_points("swiss_roll@noise=0") is None
+    assert models.exact_points("swiss_roll@uneven") is None
+    assert models.exact_points("swiss_roll") is None
+    assert models.info("swiss_roll@uneven") is None
+    assert models.missing(["swiss_roll@uneven", "swiss_roll"]) == {}
+
+
+@pytest.mark.usefixtures("no_network")
+def test_a_sampled_cloud_of_a_model_that_is_not_at_hand_is_missing():
+    assert "camelhead" in models.missing(["camelhead@uneven"])["camelhead@uneven"]
+
+
+@pytest.mark.parametrize(
+    ("case", "fault"),
+    [
+        ("swiss_roll@noise=x", "not by @noise=x"),
+        ("swiss_roll@noise=0.2", "0.1 at most"),
+        ("swiss_roll@dense", "MODEL@uneven, not by @dense"),
+        ("nothing_of_it@uneven", "there is no model 'nothing_of_it'"),
+    ],
+)
+def test_a_bad_sampling_says_what_would_do(case, fault):
+    with pytest.raises(InputError, match=fault):
+        models.load(case)
+
+
+def test_a_cloud_is_not_sampled(tmp_path):
+    file = tmp_path / "scan.xyz"
+    file.write_text("0 0 0\n1 0 0\n0 1 0\n")
+    with pytest.raises(InputError, match="has no faces to sample"):
+        models.load(f"{file}@uneven")

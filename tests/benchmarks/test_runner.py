@@ -12,11 +12,13 @@ import textwrap
 import time
 from pathlib import Path
 
+import numpy as np
 import psutil
 import pytest
 
 from baselines import registry
 from benchmarks import executors, models, runner, worker
+from benchmarks.metrics import evaluate_points
 from benchmarks.results import ResultRow, Store
 from benchmarks.runner import Summary, run
 from benchmarks.suites import Suite
@@ -336,7 +338,7 @@ from parapoint.method import MissingError
 class Guest:
     requires: ClassVar[frozenset[str]] = FACES
 
-    def load(self):
+    def preload(self):
         if not Path({str(tmp_path / "installed")!r}).exists():
             raise MissingError("needs the package guest")
         time.sleep(0.3)
@@ -481,8 +483,18 @@ def test_every_method_gives_the_same_map_in_two_cells_or_says_that_it_does_not(
     for name in promised:
         first, second = rows[0][name], rows[1][name]
         assert (first.status, first.uv_sha256) == (second.status, second.uv_sha256), name
-    assert not registry.method("parapoint(time_budget=9, device=cpu)")[1].deterministic
+    for spec in ("parapoint(time_budget=9, device=cpu)", "nuvo(time_budget=9)", "uvatlas"):
+        assert not registry.method(spec)[1].deterministic
+    assert registry.method("parapoint(device=cpu)")[1].deterministic
     assert not registry.method("external(command='{input} {output}')")[1].deterministic
+
+
+def test_the_methods_that_learn_end_well_in_a_cell(tmp_path, monkeypatch):
+    monkeypatch.setattr(runner, "_measure", lambda *_: None)
+    budget = "points=120, subset=100, iterations=2"
+    specs = [f"parapoint(preset=paper, {budget})", f"fam({budget})", f"nuvo({budget})"]
+    ran = run(suite(*specs), tmp_path / "out").ran
+    assert [(row.status, row.reason) for row in ran] == [("ok", "")] * 3
 
 
 def test_a_killed_run_loses_only_the_cell_in_flight(tmp_path):
@@ -539,3 +551,68 @@ def test_a_wild_map_has_no_metrics_but_its_run_ends(tmp_path, monkeypatch):
     assert row.id in summary.unmeasured
     assert Store(tmp_path / "out").metrics()["angle_difference_mean"].isna().all()
     assert json.loads((tmp_path / "out" / "runs.jsonl").read_text())["status"] == "ok"
+
+
+PROJECTION = """
+from dataclasses import dataclass
+from typing import ClassVar
+from parapoint import Parameterization, PointParameterization
+
+@dataclass(frozen=True)
+class Projection:
+    requires: ClassVar[frozenset[str]] = frozenset()
+    def parameterize(self, surface, *, seed):
+        return PointParameterization(surface.points[:, :2])
+
+@dataclass(frozen=True)
+class Seams:
+    requires: ClassVar[frozenset[str]] = frozenset({"seams"})
+    def parameterize(self, surface, *, seed):
+        report = {"seams": len(surface.seams)}
+        return Parameterization(surface.vertices[:, :2], surface.faces, report=report)
+
+@dataclass(frozen=True)
+class Blind:
+    requires: ClassVar[frozenset[str]] = frozenset({"faces"})
+    def parameterize(self, surface, *, seed):
+        report = {"seams": surface.seams is not None}
+        return Parameterization(surface.vertices[:, :2], surface.faces, report=report)
+"""
+
+
+def test_a_noisy_cloud_is_mapped_and_its_points_without_noise_are_scored(tmp_path):
+    plugin = tmp_path / "projection.py"
+    plugin.write_text(PROJECTION)
+    case = "saddle@noise=0.005"
+    trial = Suite("trial", "A trial", (case,), (), (0,))
+    out = tmp_path / "out"
+    run(trial, out, methods=["projection"], plugins=[f"{plugin}:Projection"])
+    store = Store(out)
+    (row,) = store.rows()
+    cloud, exact = store.surface(row), models.exact_points(case)
+    assert np.array_equal(cloud.points, models.load(case).points)
+    values = store.metrics().iloc[0]
+    truth, other = (evaluate_points(points, store.result(row)) for points in (exact, cloud))
+    name = "local_quasi_conformal_mean"
+    assert values[name] == pytest.approx(truth[name])
+    assert truth[name] != pytest.approx(other[name], rel=1e-3)
+    assert list(store.faults()) == []
+
+
+def test_the_seams_of_a_model_s_own_map_reach_the_methods_that_require_them_alone(tmp_path):
+    plugin = tmp_path / "projection.py"
+    plugin.write_text(PROJECTION)
+    try:
+        models.load("fish_control_mesh")
+    except models.MissingModelError as error:
+        pytest.skip(str(error))
+    trial = Suite("trial", "A trial", ("fish_control_mesh", "saddle"), (), (0,))
+    plugins = [f"{plugin}:Seams", f"{plugin}:Blind"]
+    run(trial, tmp_path / "out", methods=["seams", "blind"], plugins=plugins)
+    store = Store(tmp_path / "out")
+    found = {(row.case, row.method): row for row in store.rows()}
+    assert found["saddle", "seams"].status == "skipped"
+    assert "came with a UV map" in found["saddle", "seams"].reason
+    row = found["fish_control_mesh", "seams"]
+    assert row.report == {"seams": len(store.reference(row).seams(store.surface(row)))}
+    assert found["fish_control_mesh", "blind"].report == {"seams": False}

@@ -12,6 +12,7 @@ from parapoint.estimator import training_points
 from parapoint.networks import Networks
 from parapoint.presets import PRESETS
 from parapoint.testing import check_method, irregular_disk
+from parapoint.trainer import Trainer
 
 TINY = {"preset": "paper", "points": 150, "subset": 100, "iterations": 6, "device": "cpu"}
 
@@ -196,7 +197,7 @@ def test_a_model_of_another_version_or_a_damaged_one_is_one_line(fitted, tmp_pat
     fitted.save(tmp_path)
     text = (tmp_path / "model.json").read_text()
     (tmp_path / "model.json").write_text(json.dumps({**json.loads(text), "format": 99}))
-    with pytest.raises(InputError, match="format version 99; this parapoint reads version 1"):
+    with pytest.raises(InputError, match="format version 99; this parapoint reads version 2"):
         ParaPoint.load(tmp_path)
     (tmp_path / "model.json").write_text(text[:-20])
     with pytest.raises(InputError, match="damaged"):
@@ -259,6 +260,16 @@ def test_training_after_the_start_leaves_the_fast_map_as_it_is(computed: ParaPoi
     deform = longer.networks_.deform.embed.layers[0]
     assert not torch.equal(deform, computed.networks_.deform.embed.layers[0])
     assert longer.trace_[-1].iteration == 9
+
+
+def test_a_computed_map_stays_where_training_diverges(
+    computed: ParaPoint, monkeypatch, caplog
+) -> None:
+    monkeypatch.setattr(Trainer, "_step", lambda _: {"total": math.nan})
+    model = ParaPoint(**FAST).fit(paraboloid())
+    assert np.array_equal(model.transform(paraboloid()), computed.transform(paraboloid()))
+    assert model.report_["divergences"] == 2
+    assert "training diverged twice" in caplog.text
 
 
 def test_a_saved_fast_model_maps_as_before(computed: ParaPoint, tmp_path) -> None:

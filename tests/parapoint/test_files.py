@@ -4,6 +4,7 @@ import base64
 import json
 import logging
 import struct
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
-from parapoint import InputError, Mesh, Parameterization, PointCloud
+from parapoint import InputError, Mesh, Parameterization, PointCloud, files
 from parapoint.files import FORMATS, read_parameterized, read_surface, write_obj, write_points
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
@@ -711,3 +712,19 @@ def test_points_and_uv_must_agree(tmp_path, uv):
     with pytest.raises(InputError, match=r"\.ply, \.npz, \.obj"):
         write_points(tmp_path / "a.las", PointCloud(SQUARE), np.zeros((4, 2)))
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("ending", [".ply", ".obj"])
+def test_points_are_written_in_bounded_memory(ending, tmp_path, monkeypatch) -> None:
+    points = np.random.default_rng(0).normal(size=(20_000, 3))
+    cloud, uv = PointCloud(points), points[:, :2].copy()
+    write_points(tmp_path / f"whole{ending}", cloud, uv)
+    monkeypatch.setattr(files, "ROWS_WRITTEN", 999)
+    tracemalloc.start()
+    try:
+        write_points(tmp_path / f"parts{ending}", cloud, uv)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert (tmp_path / f"parts{ending}").read_bytes() == (tmp_path / f"whole{ending}").read_bytes()
+    assert peak < 2 * uv.nbytes  # one checked copy of uv, and 999 rows at a time

@@ -23,10 +23,9 @@ def plain(stack: Stack, x: torch.Tensor) -> torch.Tensor:
         ACTIVATIONS["leaky_relu"]: lambda z: torch.nn.functional.leaky_relu(z, 0.01),
         ACTIVATIONS["softplus"]: lambda z: torch.nn.functional.softplus(z, 10.0),
     }
-    layers = list(stack.layers)
-    for i in range(0, len(layers), 2):
-        x = torch.nn.functional.linear(x, layers[i], layers[i + 1])
-        if i + 2 < len(layers):
+    for i, layer in enumerate(stack.layers):
+        x = torch.nn.functional.linear(x, layer[:, :-1], layer[:, -1])
+        if i + 1 < len(stack.layers):
             x = functions[stack.activation](x)
     return x
 
@@ -56,6 +55,7 @@ def test_products_count_each_weight_once_for_a_point_and_each_tangent() -> None:
     unwrap, wrap, stitch = 3 + 2, 2 + 3, 3 + 3
     there, back = cut + unwrap, 3 * (wrap + stitch)
     assert products(net) == (there + back, deform + back + there)
+    assert products(net, tangents=2) == (3 * there + back, deform + back + there)
 
 
 @pytest.mark.parametrize("activation", ACTIVATIONS)
@@ -77,10 +77,48 @@ def test_tangents_are_columns_of_the_jacobian(activation: str) -> None:
 
 
 @pytest.mark.parametrize("activation", ACTIVATIONS.values(), ids=ACTIVATIONS)
+def test_gradients_are_those_of_plain_autograd(activation: Activation) -> None:
+    # In float32 at the paper's sizes, by double backward: Jacobians as columns of autograd.grad.
+    stack = Stack(2, 3, HIDDEN, activation, generator())
+    x = torch.randn(40, 2, generator=generator())
+
+    def objective(value: torch.Tensor, tangents: torch.Tensor) -> torch.Tensor:
+        return value.square().sum() + tangents.square().mul(torch.arange(1.0, 4)).sum()
+
+    axes = torch.eye(2)[:, None].expand(2, 40, 2)
+    made = stack(torch.cat([x[None], axes]))
+    ours = torch.autograd.grad(objective(made[0], made[1:]), [*stack.layers])
+    at = x.clone().requires_grad_()
+    value = plain(stack, at)
+    rows = [torch.autograd.grad(value[:, c].sum(), at, create_graph=True)[0] for c in range(3)]
+    theirs = torch.autograd.grad(
+        objective(value, torch.stack(rows, dim=2).permute(1, 0, 2)), [*stack.layers]
+    )
+    for own, its in zip(ours, theirs, strict=True):
+        torch.testing.assert_close(own, its, rtol=1e-3, atol=1e-4 * float(its.abs().max()))
+
+
+@pytest.mark.parametrize("activation", ACTIVATIONS.values(), ids=ACTIVATIONS)
 def test_the_gradient_of_a_function_of_values_and_tangents(activation: Activation) -> None:
     stack = Stack(2, 3, (5, 4), activation, generator()).double()
     x = torch.randn(3, 7, 2, generator=generator(), dtype=torch.float64, requires_grad=True)
     assert torch.autograd.gradcheck(lambda x, *_: stack(x), (x, *stack.layers), eps=1e-7, atol=1e-5)
+
+
+@pytest.mark.parametrize("activation", ACTIVATIONS)
+def test_nothing_leaves_the_device_of_the_points(activation: str) -> None:
+    # "meta" stands for any device but the CPU: an operation across the two raises.
+    net = networks(activation).to("meta")
+    cycle = net(torch.empty(3, 9, 3, device="meta"), torch.empty(4, 2, device="meta"))
+    outputs = [output for branch in cycle for output in branch]
+    assert {output.device.type for output in outputs} == {"meta"}
+    torch.stack([output.sum() for output in outputs]).sum().backward()
+    assert {p.grad.device.type for p in net.parameters()} == {"meta"}
+
+
+def test_no_points_are_mapped_to_none() -> None:
+    with torch.no_grad():
+        assert networks().parameterization(torch.zeros(0, 3)).shape == (0, 2)
 
 
 def test_both_branches_are_the_compositions_of_the_paper() -> None:

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from parapoint import Mesh, Parameterization, PointCloud
 from parapoint.method import UnsupportedError
 from parapoint.parameterization import TracePoint
-from parapoint.preparation import prepared
+from parapoint.preparation import prepared, shelves
 from parapoint.surface import flat_faces
 from parapoint.testing import irregular_disk, sphere
 
@@ -227,3 +227,15 @@ def test_what_cannot_be_mended_is_refused_with_the_reason():
 def test_an_unknown_word_is_a_bug_of_the_method():
     with pytest.raises(KeyError, match="flat"):
         prepared(DISK, frozenset({"flat"}))
+
+
+def test_shelves_hold_every_box_apart_and_fill_a_page_that_is_about_square():
+    sizes = np.random.default_rng(1).uniform(0.2, 1, (40, 2))
+    low = shelves(sizes)
+    high = low + sizes
+    apart = (high[:, None] < low[None]).any(axis=2)
+    apart |= apart.T
+    assert apart[~np.eye(40, dtype=bool)].all()
+    width, height = high.max(axis=0) - low.min(axis=0)
+    assert sizes.prod(axis=1).sum() > 0.6 * width * height
+    assert 0.6 < width / height < 1.6
