@@ -120,6 +120,11 @@ class MapState:
         return face_distortion(self.triangles, ~self.spanning)
 
     @cached_property
+    def validity_without_spanning(self) -> validity.Validity:
+        """State of the validity metrics over the faces that span no seam."""
+        return self.validity.of(~self.spanning) if self.spanning.any() else self.validity
+
+    @cached_property
     def validity(self) -> validity.Validity:
         """State of the validity metrics."""
         return validity.Validity(self.parameterization, self.triangles)
@@ -206,6 +211,22 @@ def _of_validity(
 ) -> list[Metric]:
     name, of = function.__name__, lambda state: function(state.validity)
     return [Metric(name=name, label=label, group="validity", function=of, **about)]
+
+
+def _of_validity_twice(
+    function: Callable[[validity.Validity], float], label: str, **about: Any
+) -> list[Metric]:
+    """A metric of that name over all faces, and over those that span no seam."""
+    (everywhere,) = _of_validity(function, label, **about)
+    return [
+        everywhere,
+        replace(
+            everywhere,
+            name=everywhere.name + WITHOUT_SPANNING,
+            label=label + " without spanning faces",
+            function=lambda state: function(state.validity_without_spanning),
+        ),
+    ]
 
 
 def _of_seams(function: Callable[[seams.Seams], float], label: str, **about: Any) -> list[Metric]:
@@ -316,10 +337,10 @@ def _isometric() -> list[Metric]:
 
 
 def _validity() -> list[Metric]:
-    of, v = _of_validity, validity
+    of, twice, v = _of_validity, _of_validity_twice, validity
     count = _FACES | {"weighting": "count", "unit": "faces"}
     return [
-        *of(
+        *twice(
             v.flipped_fraction,
             "flipped faces",
             **_FACES,
@@ -331,7 +352,7 @@ def _validity() -> list[Metric]:
             **_FACES | {"source": _SHAY},
             normalization="min(p, 1 - p) of the clockwise fraction p",
         ),
-        *of(
+        *twice(
             v.flipped_uv_area_fraction,
             "flipped UV area",
             weighting="UV area",
@@ -340,7 +361,7 @@ def _validity() -> list[Metric]:
         ),
         *of(v.degenerate_uv_count, "degenerate in UV only", **count),
         *of(v.degenerate_3d_count, "degenerate in 3D", **count),
-        *of(
+        *twice(
             v.overlap_area,
             "overlap area",
             **_AREA,

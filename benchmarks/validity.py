@@ -26,10 +26,20 @@ class Validity:
     Attributes:
         parameterization: the map.
         triangles: its faces.
+        whole: where this is a part of a map, the state of it all, and which faces (F,) these are.
     """
 
     parameterization: Parameterization
     triangles: Triangles
+    whole: tuple[Validity, BoolArray] | None = None
+
+    def of(self, faces: BoolArray) -> Validity:
+        """The state of some of the faces (F,); those are flipped that are so in the whole map."""
+        parameterization = Parameterization(
+            self.parameterization.uv, self.parameterization.corners[faces]
+        )
+        parts = {name: values[faces] for name, values in vars(self.triangles).items()}
+        return Validity(parameterization, Triangles(**parts), (self, faces))
 
     @cached_property
     def flipped(self) -> BoolArray:
@@ -38,6 +48,9 @@ class Validity:
         Faces without UV area have no orientation and are not flipped. In a tie the
         counter-clockwise faces are the majority.
         """
+        if self.whole is not None:
+            validity, faces = self.whole
+            return validity.flipped[faces]
         sign, chart = self.triangles.sign * self.turn, self.parameterization.charts()
         balance = np.bincount(chart, sign * self.triangles.area)
         return np.asarray(sign * np.where(balance < 0, -1, 1)[chart] < 0)

@@ -131,6 +131,10 @@ def test_spanning_faces_are_left_out_and_counted():
     assert_allclose(kept.uv_area.sum(), 1, rtol=EXACT)
     for name in ("area_discrepancy_total", "angle_difference_mean", "symmetric_dirichlet"):
         assert values[name + "_without_spanning"] < values[name]
+    # The rest is one to one.
+    for name in ("flipped_fraction", "flipped_uv_area_fraction", "overlap_area"):
+        assert values[name] > 0
+        assert values[name + "_without_spanning"] == 0
 
 
 @pytest.mark.parametrize("name", ["camelhead", "hand_1_i_f5000"])

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from benchmarks import builtin, overlap
+from benchmarks import builtin, overlap, validity
 from benchmarks.distortion import triangles
 from benchmarks.metrics import MapState, evaluate
 from parapoint import Mesh, Parameterization
@@ -282,3 +282,18 @@ def test_neighbours_in_a_sound_fan_are_never_compared(monkeypatch):
     found = state(mesh, parameterization).validity.overlaps
     assert found.pair_count == 0
     assert sum(compared) < 2 * len(mesh.faces)  # each face has some 12 neighbours
+
+
+def test_a_part_of_a_map_is_flipped_where_the_whole_is():
+    # A strip whose last face is folded back over the one before it.
+    uv = np.array([[0, 0], [1, 0], [0, 1], [1, 1], [2, 0], [1.0, 0.5]])
+    corners = np.array([[0, 1, 2], [1, 3, 2], [1, 4, 3], [4, 5, 3]])
+    vertices = np.column_stack([uv, np.zeros(6)])
+    vertices[5] = [2, 1, 0]
+    mesh = Mesh(vertices, corners)
+    state = MapState(mesh, Parameterization(uv, corners)).validity
+    assert state.flipped.tolist() == [False, False, False, True]
+    part = state.of(np.array([False, False, False, True]))
+    assert part.flipped.tolist() == [True]  # alone it would be its own majority
+    assert validity.flipped_uv_area_fraction(part) == 1
+    assert validity.overlap_area(part) == 0 < validity.overlap_area(state)
