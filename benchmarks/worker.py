@@ -191,6 +191,7 @@ def _perform(job: dict[str, Any], send: int) -> Never:
     faulthandler.enable(file=2, all_threads=False)
     os.chdir(job["work"])
     os.environ["TMPDIR"] = job["work"]
+    own = os.getpid()
     seed = job.get("seed", 0)
     random.seed(seed)
     np.random.seed(seed % 2**32)  # noqa: NPY002  for methods that draw from the global one
@@ -199,6 +200,7 @@ def _perform(job: dict[str, Any], send: int) -> Never:
     except BaseException as error:  # noqa: BLE001  whatever a method raises is a row
         traceback.print_exc()
         outcome = _failure(error)
+    _end_fork(own)
     with contextlib.suppress(OSError, ValueError):
         sys.stdout.flush()
         sys.stderr.flush()
@@ -223,7 +225,7 @@ def _outcome(job: dict[str, Any]) -> Outcome:
         reference = read_map(Path(job["reference"]))
         assert isinstance(reference, Parameterization)
         whole = Mesh(whole.vertices, whole.faces, reference.seams(whole))
-    preprocessing = ""
+    preprocessing, own = "", os.getpid()
     try:
         preparation = prepared(whole, method.requires)
         preprocessing = preparation.steps
@@ -238,6 +240,7 @@ def _outcome(job: dict[str, Any]) -> Outcome:
     except Exception as error:  # noqa: BLE001  as in _perform; the row says what was done before
         traceback.print_exc()
         return _failure(error) | {"preprocessing": preprocessing}
+    _end_fork(own)
     timing = {
         "preprocessing": preprocessing,
         "seconds": wall,
@@ -255,6 +258,15 @@ def _outcome(job: dict[str, Any]) -> Outcome:
     except OSError as error:  # not the method's fault: the run cannot go on
         return {"status": "stop", "reason": f"{job['map']}: {error.strerror}"}
     return {"status": "ok", "uv_sha256": arrays_hash(arrays), "report": report} | timing
+
+
+def _end_fork(own: int) -> None:
+    """End this process if it is not the cell's own but one that a method forked and that returned.
+
+    It would write the map and send an outcome a second time.
+    """
+    if os.getpid() != own:
+        os._exit(0)
 
 
 def _measured(job: dict[str, Any]) -> Outcome:
