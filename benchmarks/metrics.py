@@ -184,6 +184,12 @@ def seam_excess(state: MapState) -> float:
     return max(ours - theirs, 0.0) if ours < np.inf else ours
 
 
+def _twice(everywhere: Metric, without: Callable[[MapState], float]) -> list[Metric]:
+    """A metric over all faces, and over those that span no seam."""
+    name, label = everywhere.name + WITHOUT_SPANNING, everywhere.label + " without spanning faces"
+    return [everywhere, replace(everywhere, name=name, label=label, function=without)]
+
+
 def _of_distortion(
     group: Group, function: Callable[[FaceDistortion], float], label: str, **about: Any
 ) -> list[Metric]:
@@ -195,15 +201,7 @@ def _of_distortion(
         function=lambda state: function(state.distortion),
         **about,
     )
-    return [
-        everywhere,
-        replace(
-            everywhere,
-            name=everywhere.name + WITHOUT_SPANNING,
-            label=label + " without spanning faces",
-            function=lambda state: function(state.distortion_without_spanning),
-        ),
-    ]
+    return _twice(everywhere, lambda state: function(state.distortion_without_spanning))
 
 
 def _of_validity(
@@ -218,15 +216,7 @@ def _of_validity_twice(
 ) -> list[Metric]:
     """A metric of that name over all faces, and over those that span no seam."""
     (everywhere,) = _of_validity(function, label, **about)
-    return [
-        everywhere,
-        replace(
-            everywhere,
-            name=everywhere.name + WITHOUT_SPANNING,
-            label=label + " without spanning faces",
-            function=lambda state: function(state.validity_without_spanning),
-        ),
-    ]
+    return _twice(everywhere, lambda state: function(state.validity_without_spanning))
 
 
 def _of_seams(function: Callable[[seams.Seams], float], label: str, **about: Any) -> list[Metric]:
