@@ -182,6 +182,26 @@ def source_hash(made: Method) -> str:
     return digest.hexdigest()[:16]
 
 
+def imports(made: Method, package: str) -> bool:
+    """Whether a method's module imports a package, itself or through modules of this project."""
+    module = type(made).__module__
+    own = {"parapoint", "baselines", module.partition(".")[0]}
+    pending, seen = [module], set[str]()
+    while pending:
+        name = pending.pop()
+        if name.partition(".")[0] == package:
+            return True
+        if name in seen or name.partition(".")[0] not in own or name not in sys.modules:
+            continue
+        seen.add(name)
+        for value in vars(sys.modules[name]).values():
+            is_module = isinstance(value, ModuleType)
+            other = value.__name__ if is_module else getattr(value, "__module__", None)
+            if isinstance(other, str):
+                pending.append(other)
+    return False
+
+
 def _parsed(spec: str) -> tuple[str, dict[str, Any]]:
     """The name and the arguments in a spec.
 

@@ -67,7 +67,7 @@ class Display(Progress):
 
     def started(self, cell: Cell) -> None:
         """Show a cell as running."""
-        name = f"{cell.row.case} {cell.spec}"
+        name = f"{cell.row.case} {cell.method.spec}"
         self._running[cell.row.id] = (name, time.monotonic())
 
     def ended(self, cell: Cell, row: ResultRow) -> None:
@@ -75,7 +75,7 @@ class Display(Progress):
         self._running.pop(row.id, None)
         self._bar.advance(self._task)
         if row.status in BAD and not self._bar.disable:
-            self._bar.console.print(escape(f"{cell.row.case} {cell.spec}: {ending(row)}"))
+            self._bar.console.print(escape(f"{cell.row.case} {cell.method.spec}: {ending(row)}"))
 
     def measured(self, done: int, total: int) -> None:
         """Show how far the metrics are."""
@@ -102,7 +102,7 @@ def plan(summary: Summary) -> str:
     lines = [f"{suite.name}: {count} cells to run{f' ({why})' if why else ''}{kept}"]
     again = [cell for cell in summary.planned if cell.why != "new"]
     lines += [
-        f"again: {cell.row.case}, {cell.spec}, seed {cell.row.seed}: {cell.why}"
+        f"again: {cell.row.case}, {cell.method.spec}, seed {cell.row.seed}: {cell.why}"
         for cell in again[:LISTED]
     ]
     if len(again) > LISTED:

@@ -6,6 +6,8 @@ a run that was never disturbed.
 
 `scale`: runs of an instant method. What the harness costs a cell, whether that grows with the
 number of cells, how large the store becomes, how long a finished run takes to say so.
+
+`overhead`: cells of every method. What each takes beside the seconds of the method.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ import os
 import random
 import shutil
 import signal
+import statistics
 import tempfile
 import time
 from dataclasses import dataclass
@@ -23,6 +26,7 @@ from typing import Any
 import click
 import numpy as np
 
+from baselines import registry
 from benchmarks import instant, runner
 from benchmarks.results import Store
 from benchmarks.suites import Suite
@@ -32,6 +36,13 @@ from parapoint.testing import irregular_disk
 PLUGIN = f"{instant.__file__}:Instant"
 TIMING = ("seconds", "cpu_seconds", "peak_memory_mb", "run")
 """What differs between two rows of the same cell."""
+CASES = ("half_cylinder", "saddle@noise=0")
+"""A mesh and a cloud, for methods of either."""
+BUDGETS = {
+    **dict.fromkeys(("parapoint", "fam", "nuvo"), "points=120, subset=100, iterations=2"),
+    "parapoint+slim": "points=120, iterations=2",
+}
+"""Parameters of the methods that would take minutes."""
 
 
 def instant_suite(folder: Path, models: int, methods: int, seeds: int) -> Suite:
@@ -203,6 +214,38 @@ def scale(models: int, methods: int, seeds: int, jobs: int, out: Path) -> None:
     cells = len(summary.kept)
     size = sum(path.stat().st_size for path in store.rglob("*") if path.is_file())
     print(f"store: {size / 1e6:.1f} MB, {size / cells:.0f} bytes a cell")
+
+
+@main.command()
+@click.option("--cells", type=click.IntRange(1), default=5, show_default=True)
+def overhead(cells: int) -> None:
+    """Run CELLS cells of every method on a mesh and on a cloud: what the harness adds to each."""
+    clock = _Clock()
+    specs = [f"{name}({BUDGETS.get(name, '')})" for name in registry.METHODS if name != "external"]
+    suite = Suite("overhead", "Small cells of every method", CASES, (*specs,), (*range(cells),))
+    with tempfile.TemporaryDirectory() as name:
+        runner.run(suite, name, progress=clock)
+    for method, seconds in sorted(clock.added.items()):
+        median, longest = statistics.median(seconds), max(seconds)
+        print(f"{method:16} {len(seconds):3} cells  {median:.3f} s, at most {longest:.3f} s")
+
+
+class _Clock(runner.Progress):
+    """Seconds that each cell that is ok took beside its method, by method."""
+
+    def __init__(self) -> None:
+        self.began = 0.0
+        self.added: dict[str, list[float]] = {}
+
+    def started(self, cell: runner.Cell) -> None:  # noqa: ARG002  as its base
+        """Start the clock."""
+        self.began = time.monotonic()
+
+    def ended(self, cell: runner.Cell, row: Any) -> None:  # noqa: ARG002  as its base
+        """Note the time since, but for that of the method."""
+        if row.status == "ok":
+            added = time.monotonic() - self.began - row.seconds
+            self.added.setdefault(row.method, []).append(added)
 
 
 def _processor_seconds() -> float:

@@ -129,23 +129,27 @@ class Task:
         inputs: the files that it reads, by the name under which it is told where each is.
         began: called when it is under way.
         ended: called with its outcome, the last lines printed and the file it may have written.
+        modules: what its supervisor has imported before, so that the task need not. Another set of
+            them, another supervisor: what a task finds in memory is not up to those before it.
     """
 
     job: Mapping[str, Any]
     inputs: Mapping[str, Path]
     began: Callable[[], None]
     ended: Callable[[Outcome, str, Path], None]
+    modules: tuple[str, ...] = ()
 
 
 class _Slot:
-    """A supervisor process, and the task that it is busy with."""
+    """A supervisor process, and the task that it is busy with or gets once it is ready."""
 
-    def __init__(self, threads: int) -> None:
-        """Start a supervisor whose children may use `threads` threads."""
+    def __init__(self, threads: int, modules: tuple[str, ...]) -> None:
+        """Start a supervisor with `modules`, whose children may use `threads` threads."""
+        self.modules = modules
         self.replies, send = os.pipe()
         variables = dict.fromkeys(THREAD_VARIABLES, str(threads)) | {"PYTHONHASHSEED": "0"}
         self.process = subprocess.Popen(  # noqa: S603  our own module
-            [sys.executable, "-m", "benchmarks.worker", str(send)],
+            [sys.executable, "-m", "benchmarks.worker", str(send), *modules],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -167,17 +171,16 @@ class _Slot:
         self.ready = False
         self.task: Task | None = None
         self.folder = Path()
-        self.started = 0.0
+        self.started = math.inf
 
     @property
     def time_limit(self) -> float:
         """Seconds that the task may take."""
         return float(self.task.job["time_limit"]) if self.task else math.inf
 
-    def give(self, task: Task, folder: Path) -> None:
-        """Begin a task, which may write into `folder`."""
+    def begin(self, task: Task, folder: Path) -> None:
+        """Begin its task, which may write into `folder`."""
         self.printed.clear()
-        self.task = task
         self.folder = folder
         self.started = time.monotonic()
         inputs = {name: str(path.resolve()) for name, path in task.inputs.items()}
@@ -242,6 +245,8 @@ class Local:
         self.tick = tick
         self.selector = selectors.DefaultSelector()
         self.slots: set[_Slot] = set()
+        self.harmful: set[tuple[str, ...]] = set()
+        """Modules whose import ended a supervisor: tasks import these themselves."""
 
     def __enter__(self) -> Self:
         """Clear what a run that was killed has left."""
@@ -258,21 +263,25 @@ class Local:
     def run(self, tasks: Sequence[Task], jobs: int) -> None:
         """Do all tasks, `jobs` at a time."""
         waiting = deque(tasks)
-        jobs = min(jobs, len(tasks))
         while waiting or self._busy():
-            while len(self.slots) < jobs:
-                self._open()
-            for slot in self.slots:
-                if waiting and slot.ready and not slot.task and self._busy() < jobs:
-                    self._begin(slot, waiting.popleft())
+            while waiting and self._busy() < jobs:
+                self._assign(waiting.popleft())
             self._listen()
             self.tick()
 
     def _busy(self) -> int:
         return sum(slot.task is not None for slot in self.slots)
 
-    def _open(self) -> None:
-        slot = _Slot(self.threads)
+    def _assign(self, task: Task) -> None:
+        """Give `task` to an idle supervisor that has its modules, or to a new one."""
+        modules = () if task.modules in self.harmful else task.modules
+        for slot in self.slots:
+            if slot.task is None and slot.modules == modules:
+                slot.task = task
+                self._begin(slot, task)
+                return
+        slot = _Slot(self.threads, modules)
+        slot.task = task
         self.slots.add(slot)
         self.selector.register(slot.replies, selectors.EVENT_READ, slot)
         self.selector.register(slot.output, selectors.EVENT_READ, slot)
@@ -282,7 +291,7 @@ class Local:
             self.folder.mkdir(exist_ok=True)
             folder = Path(tempfile.mkdtemp(dir=self.folder)).resolve()
             (folder / "work").mkdir()
-        slot.give(task, folder)
+        slot.begin(task, folder)
         task.began()
 
     def _listen(self) -> None:
@@ -291,9 +300,11 @@ class Local:
             news = slot.hear()
             slot.drain()
             for outcome in news or ():
-                slot.ready = True
-                if slot.task is not None:
+                if slot.task is not None and slot.ready:
                     self._end(slot, outcome)
+                elif slot.task is not None:
+                    slot.ready = True
+                    self._begin(slot, slot.task)
             if news is None:
                 self._lost(slot)
         now = time.monotonic()
@@ -301,20 +312,23 @@ class Local:
             self._lost(slot)
 
     def _lost(self, slot: _Slot) -> None:
-        """Deal with a supervisor that is gone or hangs: its task ends with it."""
-        if slot.task is None:
+        """Deal with a supervisor that is gone or hangs: a task that it had begun ends with it."""
+        self.slots.discard(slot)
+        self.selector.unregister(slot.replies)
+        self.selector.unregister(slot.output)
+        slot.close()
+        if not slot.ready and slot.modules and slot.task is not None:
+            self.harmful.add(slot.modules)
+            self._assign(slot.task)
+        elif not slot.ready or slot.task is None:
             said = last_lines(slot.printed, lines=1)
             raise RuntimeError(f"benchmarks.worker ended unasked: {said}")
-        if time.monotonic() > slot.started + slot.time_limit:
+        elif time.monotonic() > slot.started + slot.time_limit:
             reason = f"not done within the limit of {slot.time_limit:g} s, and hard to kill"
             self._end(slot, {"status": "timeout", "reason": reason})
         else:
             reason = "killed the process that watched over it"
             self._end(slot, {"status": "failed", "reason": reason})
-        self.slots.discard(slot)
-        self.selector.unregister(slot.replies)
-        self.selector.unregister(slot.output)
-        slot.close()
 
     def _end(self, slot: _Slot, outcome: Outcome) -> None:
         task = slot.task
@@ -389,7 +403,14 @@ class Remote:
             plugins.append((Path(path).name, name, Path(path).read_bytes()))
         inputs = {name: path.read_bytes() for name, path in task.inputs.items()}
         return self.client.submit(
-            performed, task.job, inputs, plugins, self.threads, self.project, pure=False
+            performed,
+            task.job,
+            inputs,
+            plugins,
+            self.threads,
+            self.project,
+            modules=task.modules,
+            pure=False,
         )
 
     def _end(self, task: Task, future: Any) -> None:
@@ -428,6 +449,8 @@ def performed(
     plugins: Sequence[tuple[str, str, bytes]],
     threads: int,
     project: str,
+    *,
+    modules: tuple[str, ...],
 ) -> tuple[Outcome, str, bytes]:
     """Do a task on a worker: its outcome, the last lines printed, and the map file.
 
@@ -437,6 +460,7 @@ def performed(
         plugins: file name, class and source of each method that comes with it.
         threads: how many threads it may use.
         project: version of the project that sends it.
+        modules: what its supervisor is to have imported.
 
     Raises:
         InputError: this worker has another version, or its disk is full.
@@ -468,7 +492,7 @@ def performed(
             path.parent.mkdir()
             path.write_bytes(source)
             locations.append(f"{path}:{kind}")
-        task = Task({**job, "plugins": locations}, places, lambda: None, ended)
+        task = Task({**job, "plugins": locations}, places, lambda: None, ended, modules)
         try:
             local.run([task], 1)
         except BaseException:

@@ -7,6 +7,7 @@ of it may be killed at any time: what has a row is kept, and the same call goes 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 import time
 from collections import Counter
@@ -28,6 +29,9 @@ TIME_LIMIT = 1800.0
 """Seconds a cell may take unless said otherwise."""
 METRICS_TIME_LIMIT = 120.0
 """Seconds that the metrics of one map may take; on real maps of 100k faces they take a few."""
+SLOW = ("torch", "pymeshlab")
+"""Packages that are slow to import and start no thread by it: cells of methods that import them are
+forked from a process that has them."""
 READERS = ("files", "mesh_formats", "point_formats", "surface")
 """Modules of `parapoint` that make a surface of a file."""
 
@@ -38,12 +42,12 @@ class Cell:
 
     Attributes:
         row: its row before it has run: the identity is filled in, what comes after it is not.
-        spec: the method as it was asked for, such as "slim(iterations=1)".
+        method: what it runs.
         why: why it runs: "new", or what changed since its last row.
     """
 
     row: ResultRow
-    spec: str
+    method: Chosen
     why: str
 
 
@@ -55,6 +59,7 @@ class Chosen:
     name: str
     params: Mapping[str, object]
     source_hash: str
+    modules: tuple[str, ...]
 
 
 @dataclass
@@ -257,7 +262,8 @@ def _choice(
     made += [(name, *registry.method(name)) for name in added if name not in named]
     for spec, name, method in made:
         params = plain(dataclasses.asdict(cast("Any", method)))
-        chosen.append(Chosen(spec, name, params, registry.source_hash(method)))
+        modules = tuple(module for module in SLOW if registry.imports(method, module))
+        chosen.append(Chosen(spec, name, params, registry.source_hash(method), modules))
     asked = suite.cases if cases is None else cases
     names = tuple(dict.fromkeys(models.canonical_name(case) for case in asked))
     asked_seeds = suite.seeds if seeds is None else tuple(dict.fromkeys(seeds))
@@ -358,7 +364,7 @@ def _todo(
                 row = rows.get(blank.cell)
                 why = "new" if row is None else _changed(blank, row, store, runs, here)
                 if why:
-                    yield Cell(blank, method.spec, why)
+                    yield Cell(blank, method, why)
                 elif row is not None:
                     summary.kept.append(row)
 
@@ -432,7 +438,7 @@ class _Book:
         """What runs a cell and writes its row; `shared` holds the limits and plugins of all."""
         job = {
             **shared,
-            "spec": cell.spec,
+            "spec": cell.method.spec,
             "seed": cell.row.seed,
             "source_hash": cell.row.source_hash,
         }
@@ -449,7 +455,8 @@ class _Book:
 
         inputs = {"surface": self.store.surface_path(cell.row.surface_hash)}
         inputs |= _reference(self.store, cell.row)
-        return Task(job, inputs, lambda: self.progress.started(cell), ended)
+        began = functools.partial(self.progress.started, cell)
+        return Task(job, inputs, began, ended, cell.method.modules)
 
     def write(self, cell: Cell, outcome: Mapping[str, Any]) -> None:
         """Write the row of `cell`."""

@@ -1,12 +1,14 @@
 """One cell of a run: a process of its own, under a time limit and a memory limit.
 
-`python -m benchmarks.worker FD` is a supervisor. It has the slow imports behind it, takes jobs
-(cells, and later the metrics of their maps) as JSON lines on standard input, runs each in a child
-process that it watches, and answers with one JSON line each on file descriptor FD.
+`python -m benchmarks.worker FD [MODULE ...]` is a supervisor. It has the slow imports behind it,
+those of MODULE included, takes jobs (cells, and later the metrics of their maps) as JSON lines on
+standard input, runs each in a child process that it watches, and answers with one JSON line each on
+file descriptor FD.
 
 On Linux the child is a fork, which costs milliseconds. The supervisor only imports and never
 computes: no thread exists that a fork could lose (but OpenBLAS's own, which it stops and restarts
-around a fork). Elsewhere, where forking after such imports is not safe, the child is a fresh
+around a fork). It imports nothing because a cell does, and no plugin: the tenth cell finds what the
+first one found. Elsewhere, where forking after such imports is not safe, the child is a fresh
 interpreter.
 
 What a method may do, it does to its own cell: the child has its own session, its own empty working
@@ -80,6 +82,9 @@ def main() -> None:
     os.set_inheritable(reply, False)
     if FORKS:
         ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+        for module in sys.argv[2:]:
+            with contextlib.suppress(Exception):  # a method that needs it says so in its cell
+                importlib.import_module(module)
     wake, waker = os.pipe()
     os.set_blocking(wake, False)
     os.set_blocking(waker, False)
@@ -141,7 +146,10 @@ def _supervised(job: dict[str, Any], wake: int, private: list[int]) -> Outcome:
     message += _available(result)
     os.close(result)
     _bury(child)
-    outcome = verdict or _message(message) or _death(status, _system_kills() > kills)
+    said = _message(message)
+    if verdict is None:
+        verdict = said if "status" in said else _death(status, _system_kills() > kills)
+    outcome = {"preprocessing": said.get("preprocessing", "")} | verdict
     unit = 1 if sys.platform == "darwin" else 1024  # of ru_maxrss, in bytes
     return outcome | {"peak_memory_mb": max(peak, usage.ru_maxrss * unit) / 1e6}
 
@@ -196,7 +204,7 @@ def _perform(job: dict[str, Any], send: int) -> Never:
     random.seed(seed)
     np.random.seed(seed % 2**32)  # noqa: NPY002  for methods that draw from the global one
     try:
-        outcome = _measured(job) if "measure" in job else _outcome(job)
+        outcome = _measured(job) if "measure" in job else _outcome(job, send)
     except BaseException as error:  # noqa: BLE001  whatever a method raises is a row
         traceback.print_exc()
         outcome = _failure(error)
@@ -204,17 +212,25 @@ def _perform(job: dict[str, Any], send: int) -> Never:
     with contextlib.suppress(OSError, ValueError):
         sys.stdout.flush()
         sys.stderr.flush()
-    content = json.dumps(outcome).encode() + b"\n"
+    _tell(send, outcome)
+    os._exit(0)  # threads, exit handlers and destructors of a method have no say any more
+
+
+def _tell(send: int, said: Outcome) -> None:
+    """Send fields of a row: one line."""
+    content = json.dumps(said).encode() + b"\n"
     if len(content) > LARGEST_MESSAGE:
         reason = f"its report is too large ({len(content)} bytes)"
         content = json.dumps({"status": "failed", "reason": reason}).encode() + b"\n"
     while content:
         content = content[os.write(send, content) :]
-    os._exit(0)  # threads, exit handlers and destructors of a method have no say any more
 
 
-def _outcome(job: dict[str, Any]) -> Outcome:
-    """Run the method and store its map: the fields of the row that it fills."""
+def _outcome(job: dict[str, Any], send: int) -> Outcome:
+    """Run the method and store its map: the fields of the row that it fills.
+
+    What was done to the surface before is sent ahead: the method may not come to an end.
+    """
     for plugin in job["plugins"]:
         registry.register_plugin(plugin)
     _, method = registry.method(job["spec"])
@@ -229,6 +245,7 @@ def _outcome(job: dict[str, Any]) -> Outcome:
     try:
         preparation = prepared(whole, method.requires)
         preprocessing = preparation.steps
+        _tell(send, {"preprocessing": preprocessing})
         if hasattr(method, "preload"):
             method.preload()
         before, wall = os.times(), time.perf_counter()
@@ -314,15 +331,13 @@ def _failure(error: BaseException) -> Outcome:
     return {"status": status, "reason": f"{name}: {_line(error)}".removesuffix(": ")}
 
 
-def _message(content: bytearray) -> Outcome | None:
-    """The outcome that a child sent, or None where it did not come to its end."""
-    if not content.endswith(b"\n"):
-        return None
-    try:
-        outcome = json.loads(content)
-    except ValueError:
-        return None
-    return outcome if isinstance(outcome, dict) and "status" in outcome else None
+def _message(content: bytearray) -> Outcome:
+    """The fields that a child sent, in whole lines; with a status where it came to its end."""
+    said: Outcome = {}
+    for line in content.split(b"\n")[:-1]:
+        with contextlib.suppress(ValueError, TypeError):  # a method may have written into the pipe
+            said |= json.loads(line)
+    return said
 
 
 def _death(status: int, killed_by_system: bool) -> Outcome:

@@ -166,7 +166,7 @@ def test_a_run_on_two_workers_one_of_which_dies_gives_the_rows_of_a_local_one(
 
 def test_a_worker_of_another_version_ends_the_run_in_words():
     with pytest.raises(InputError, match="has another version of the project"):
-        executors.performed({}, {}, [], 1, "another")
+        executors.performed({}, {}, [], 1, "another", modules=())
 
 
 def test_a_cell_that_lost_two_workers_runs_again_next_time(tmp_path, monkeypatch):

@@ -152,7 +152,9 @@ class InProcess(executors.Local):
         for task in tasks:
             task.began()
             path = self.folder.with_name("map.npz")
-            outcome = worker._outcome({**task.job, **task.inputs, "map": str(path)})
+            with Path(os.devnull).open("wb") as ahead:
+                job = {**task.job, **task.inputs, "map": str(path)}
+                outcome = worker._outcome(job, ahead.fileno())
             task.ended(outcome | {"took": 0.0}, "", path)
 
 

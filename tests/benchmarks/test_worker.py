@@ -95,7 +95,9 @@ def test_a_row_says_what_was_done_to_the_surface_before_and_in_which_component_i
         "non-manifold vertices; turned 20 faces; packed 2 components; "
         "automatic cut to a disk (1 of 2 components)"
     )
-    outcome = worker._outcome(job)
+    receive, send = os.pipe()
+    outcome = worker._outcome(job, send)
+    assert worker._message(bytearray(os.read(receive, 4096))) == {"preprocessing": steps}
     assert (outcome["status"], outcome["preprocessing"]) == ("ok", steps)
     mesh, result = read_surface(store.surface_path(surface)), read_map(tmp_path / "map.npz")
     values = measured(mesh, result)
@@ -112,17 +114,20 @@ def test_a_row_says_what_was_done_to_the_surface_before_and_in_which_component_i
         raise ValueError("no")
 
     monkeypatch.setattr(type(method), "parameterize", refusing)
-    outcome = worker._outcome(job)
+    outcome = worker._outcome(job, send)
+    os.close(receive)
+    os.close(send)
     assert (outcome["status"], outcome["preprocessing"]) == ("failed", steps)
     assert outcome["reason"] == "ValueError: no (component 1 of 2, 176 faces)"
 
 
 def test_a_message_counts_only_if_it_is_whole():
-    whole = b'{"status": "ok"}\n'
+    ahead, whole = b'{"preprocessing": "cut"}\n', b'{"status": "ok"}\n'
     assert worker._message(bytearray(whole)) == {"status": "ok"}
+    assert worker._message(bytearray(ahead + whole)) == {"preprocessing": "cut", "status": "ok"}
     for length in range(len(whole)):
-        assert worker._message(bytearray(whole[:length])) is None
-    assert worker._message(bytearray(b"[1]\n")) is None
+        assert worker._message(bytearray(ahead + whole[:length])) == {"preprocessing": "cut"}
+    assert worker._message(bytearray(b"[1]\n\xff\n3\n")) == {}
 
 
 @pytest.mark.parametrize("forks", [True, False])
