@@ -7,6 +7,7 @@ torch, alone.
 from __future__ import annotations
 
 import ast
+import functools
 import hashlib
 import importlib
 import importlib.util
@@ -333,24 +334,26 @@ def _sources(module: ModuleType) -> dict[str, Path]:
     sources = {module.__name__: Path(module.__file__)}
     left = [module.__name__]
     while left:
-        tree = ast.parse(sources[left.pop()].read_text(encoding="utf-8"))
-        for node in ast.walk(tree):
-            if isinstance(node, ast.Import):
-                imported = [alias.name for alias in node.names]
-            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-                imported = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
-            else:
+        for name in _imported(sources[left.pop()].read_text(encoding="utf-8")):
+            if name.partition(".")[0] != package or name in sources or name == package:
                 continue
-            for name in imported:
-                if name.partition(".")[0] != package or name in sources or name == package:
-                    continue
-                path = Path(sys.modules[package].__path__[0], *name.split(".")[1:]).with_suffix(
-                    ".py"
-                )
-                if path.is_file():
-                    sources[name] = path
-                    left.append(name)
+            path = Path(sys.modules[package].__path__[0], *name.split(".")[1:]).with_suffix(".py")
+            if path.is_file():
+                sources[name] = path
+                left.append(name)
     return sources
+
+
+@functools.cache
+def _imported(source: str) -> tuple[str, ...]:
+    """Names that the source of a module imports, whether they are modules or what is in them."""
+    names: list[str] = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+    return tuple(names)
 
 
 def _version(package: str) -> str:

@@ -43,7 +43,8 @@ from typing import Any, Never
 import igl  # noqa: F401  imported before the forks, so that no cell pays for it
 import numpy as np
 import psutil
-import scipy.sparse.linalg  # noqa: F401  as above
+import scipy.sparse.linalg
+import scipy.spatial  # noqa: F401  as above
 
 from baselines import registry
 from benchmarks.results import (
