@@ -279,8 +279,9 @@ def _near(name: str, known: list[str]) -> str:
     return f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(known)}"
 
 
+@functools.cache
 def _installed() -> dict[str, metadata.EntryPoint]:
-    """Entry points of installed packages by name."""
+    """Entry points of installed packages by name; looking reads a file of each package."""
     return {entry.name: entry for entry in metadata.entry_points(group=GROUP)}
 
 

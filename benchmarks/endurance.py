@@ -106,6 +106,7 @@ def toll(suite: Suite, folder: Path, *, count: int, seed: int) -> Toll:
             found.fault(f"{out.name}: {fault}")
         if _table(Store(out)) != expected:
             found.fault(f"{out.name}: another table than that of the undisturbed run")
+        print(found, flush=True)
         shutil.rmtree(out)
     return found
 

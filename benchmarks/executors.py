@@ -36,7 +36,7 @@ from typing import Any, Protocol, Self
 import psutil
 
 from benchmarks import environment
-from benchmarks.results import disk_said, replacing
+from benchmarks.archives import disk_said, replacing
 from parapoint.errors import InputError
 
 GRACE = 15.0

@@ -30,8 +30,6 @@ import os
 import re
 import sys
 import typing
-import zipfile
-import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -39,18 +37,26 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from benchmarks.archives import (
+    arrays_hash,
+    disk_said,
+    map_arrays,
+    read_map,
+    read_surface,
+    replacing,
+    surface_arrays,
+    sync_folder,
+    write_arrays,
+)
 from parapoint.errors import InputError
-from parapoint.parameterization import Parameterization, PointParameterization, TracePoint
+from parapoint.parameterization import Parameterization, PointParameterization
 from parapoint.surface import Mesh, PointCloud, Surface
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Status = Literal["ok", "skipped", "failed", "timeout", "out_of_memory"]
-Arrays = Mapping[str, npt.NDArray[Any]]
-
 FORMAT = 1
 """Version of the folder's layout; a folder with a larger one is left alone."""
 
@@ -60,11 +66,6 @@ SOURCE_CHANGED = "the source of the method changed during the run; run again"
 """Reason of a row that the next run does anew whatever its hash says."""
 MISSING = "not installed: "
 """Begins the reason of a row that lacked a package or program: the next run tries it again."""
-_DAMAGE = (
-    *(OSError, EOFError, ValueError, TypeError, AttributeError, KeyError, MemoryError),
-    *(NotImplementedError, zipfile.BadZipFile, zlib.error),
-)
-"""What reading a damaged archive raises."""
 _log = logging.getLogger("parapoint")
 
 
@@ -157,148 +158,11 @@ def identity(
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
-def arrays_hash(arrays: Arrays) -> str:
-    """64 hexadecimal digits over the names, shapes and values of `arrays`."""
-    digest = hashlib.sha256()
-    for name, array in sorted(arrays.items()):
-        digest.update(f"{name} {array.dtype.str} {array.shape} ".encode())
-        digest.update(np.ascontiguousarray(array).tobytes())
-    return digest.hexdigest()
-
-
-def surface_arrays(surface: Surface) -> dict[str, npt.NDArray[Any]]:
-    """The arrays that make up `surface`."""
-    if isinstance(surface, Mesh):
-        return {"vertices": surface.vertices, "faces": surface.faces}
-    if surface.normals is None:
-        return {"points": surface.points}
-    return {"points": surface.points, "normals": surface.normals}
-
-
-def map_arrays(result: Parameterization | PointParameterization) -> dict[str, npt.NDArray[Any]]:
-    """The arrays that make up the map itself, its trace apart."""
-    if isinstance(result, Parameterization):
-        return {"uv": result.uv, "corners": result.corners}
-    return {"uv": result.uv}
-
-
-def trace_arrays(trace: tuple[TracePoint, ...]) -> dict[str, npt.NDArray[Any]]:
-    """A trace as arrays: absent values are NaN, the map of point n is `trace_uv_<n>`."""
-    if not trace:
-        return {}
-    steps, seconds, terms, maps = zip(*trace, strict=True)
-    names = list(dict.fromkeys(name for term in terms for name in term))
-    values = [[float(term.get(name, math.nan)) for name in names] for term in terms]
-    arrays: dict[str, npt.NDArray[Any]] = {
-        "trace_iteration": np.array(steps, dtype=np.int64),
-        "trace_seconds": np.array(seconds, dtype=np.float64),
-        "trace_names": np.array(names, dtype=np.str_),
-        "trace_values": np.array(values, dtype=np.float64).reshape(len(trace), len(names)),
-    }
-    for n, uv in enumerate(maps):
-        if uv is not None:
-            arrays[f"trace_uv_{n}"] = np.asarray(uv, dtype=np.float64)
-    return arrays
-
-
-def _trace(arrays: Arrays) -> tuple[TracePoint, ...]:
-    """The trace that `trace_arrays` wrote."""
-    if "trace_iteration" not in arrays:
-        return ()
-    names = [str(name) for name in arrays["trace_names"]]
-    return tuple(
-        TracePoint(
-            int(iteration),
-            float(arrays["trace_seconds"][n]),
-            {
-                name: float(value)
-                for name, value in zip(names, arrays["trace_values"][n], strict=True)
-                if not math.isnan(value)
-            },
-            arrays.get(f"trace_uv_{n}"),
-        )
-        for n, iteration in enumerate(arrays["trace_iteration"])
-    )
-
-
-def write_arrays(path: Path, arrays: Arrays) -> None:
-    """Write `arrays` to the npz file `path`, all or nothing, and onto the disk."""
-    # Indices are most of a map's size, and 32 bits hold them: half the bytes to compress.
-    small = {
-        name: array.astype(np.int32)
-        if array.dtype == np.int64 and array.size and abs(array).max() < 2**31
-        else array
-        for name, array in arrays.items()
-    }
-    with replacing(path) as stream:
-        np.savez_compressed(stream, allow_pickle=False, **small)
-
-
-def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
-    """The arrays of the npz file `path`; nothing in it is unpickled.
-
-    Raises:
-        InputError: the file is missing or damaged.
-    """
-    try:
-        # Opened here: numpy leaves the file open where it is no archive.
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-    except FileNotFoundError:
-        raise InputError(f"{path}: missing") from None
-    except _DAMAGE as error:
-        raise InputError(f"{path}: damaged ({error})") from None
-    return {
-        name: array.astype(np.int64) if array.dtype == np.int32 else array
-        for name, array in arrays.items()
-    }
-
-
-@contextlib.contextmanager
-def replacing(path: Path) -> Iterator[typing.IO[bytes]]:
-    """A stream whose content becomes the file `path`, in one step, when the block ends well."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with part.open("wb") as stream:
-            yield stream
-            stream.flush()
-            os.fsync(stream.fileno())
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
-    _sync_folder(path.parent)
-
-
-def _sync_folder(folder: Path) -> None:
-    """Put the names in `folder` onto the disk, where the system can."""
-    with contextlib.suppress(OSError, AttributeError):
-        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
-
-
 def _write_whole(stream: int, line: bytes) -> None:
     """Write `line` in one write and put it onto the disk."""
     if os.write(stream, line) != len(line):
         raise OSError(errno.ENOSPC, "short write")
     os.fsync(stream)
-
-
-@contextlib.contextmanager
-def disk_said(path: Path) -> Iterator[None]:
-    """Says a full disk, or a limit on files that is reached, in one clear line."""
-    try:
-        yield
-    except OSError as error:
-        if error.errno in {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}:
-            raise InputError(
-                f"{path}: {os.strerror(error.errno).lower()}; earlier results are intact: make "
-                "room and run the same command again"
-            ) from None
-        raise
 
 
 def _row(line: bytes) -> ResultRow | None:
@@ -725,7 +589,7 @@ class Store:
         with disk_said(target):
             target.parent.mkdir(exist_ok=True)
             path.replace(target)
-        _sync_folder(target.parent)
+        sync_folder(target.parent)
 
     def add_run(self, entry: Mapping[str, object]) -> int:
         """Add an entry to `environment.json`; its number."""
@@ -735,39 +599,6 @@ class Store:
         with disk_said(path), replacing(path) as stream:
             stream.write(json.dumps(content, indent=1).encode() + b"\n")
         return len(content["runs"]) - 1
-
-
-def read_surface(path: Path) -> Surface:
-    """The surface in a file of the store.
-
-    Raises:
-        InputError: the file is missing or damaged.
-    """
-    arrays = read_arrays(path)
-    try:
-        if "faces" in arrays:
-            return Mesh(arrays["vertices"], arrays["faces"])
-        return PointCloud(arrays["points"], arrays.get("normals"))
-    except (InputError, KeyError) as error:
-        raise InputError(f"{path}: damaged ({error})") from None
-
-
-def read_map(
-    path: Path, report: Mapping[str, object] | None = None
-) -> Parameterization | PointParameterization:
-    """The map in a file of the store, with its trace.
-
-    Raises:
-        InputError: the file is missing or damaged.
-    """
-    arrays = read_arrays(path)
-    try:
-        trace = _trace(arrays)
-        if "corners" in arrays:
-            return Parameterization(arrays["uv"], arrays["corners"], trace, report or {})
-        return PointParameterization(arrays["uv"], trace, report or {})
-    except (InputError, KeyError, IndexError, ValueError, TypeError) as error:
-        raise InputError(f"{path}: damaged ({error})") from None
 
 
 def measured(

@@ -228,9 +228,26 @@ def test_installed_package_that_cannot_be_imported_says_so(tmp_path, monkeypatch
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text("[parapoint.methods]\nbroken = no_such_module:Thing\n")
     monkeypatch.syspath_prepend(tmp_path)
+    registry._installed.cache_clear()
     assert "broken" in registry.names()
     with pytest.raises(InputError, match=r"broken .* cannot be imported"):
         registry.method("broken")
+    registry._installed.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("name", "imported"),
+    [
+        ("tutte", set()),
+        ("parapoint", {"torch"}),
+        ("automatic+slim", {"torch"}),
+        ("meshlab_lscm", {"pymeshlab"}),
+        ("meshed", {"pymeshlab"}),
+    ],
+)
+def test_what_a_method_imports_is_known_through_modules_of_the_project(name, imported):
+    method = registry.method(name)[1]
+    assert {name for name in ("torch", "pymeshlab") if registry.imports(method, name)} == imported
 
 
 @pytest.mark.usefixtures("_no_plugins")

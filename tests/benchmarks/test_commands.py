@@ -11,7 +11,8 @@ import pytest
 
 from benchmarks import __main__ as commands
 from benchmarks import models, runner, suites
-from benchmarks.results import Store, map_arrays, write_arrays
+from benchmarks.archives import map_arrays, write_arrays
+from benchmarks.results import Store
 from parapoint import console
 from parapoint.errors import InputError
 

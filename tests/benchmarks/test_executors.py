@@ -218,7 +218,7 @@ def test_slurm_is_asked_for_the_right_jobs_and_they_do_the_cells(tmp_path, slow,
     submitted = tmp_path / "submitted"
     submitted.mkdir()
     for name, text in {
-        "sbatch": f'cp "$1" {submitted}/$$.sh; bash "$1" >/dev/null 2>&1 &\necho $!',
+        "sbatch": f'cp "$1" {submitted}/$$.sh; bash {submitted}/$$.sh >/dev/null 2>&1 &\necho $!',
         "scancel": 'for id in "$@"; do pkill -P "$id"; kill "$id"; done 2>/dev/null; true',
     }.items():
         (tmp_path / name).write_text(f"#!/bin/bash\n{text}\n")

@@ -11,17 +11,8 @@ import numpy as np
 import pytest
 
 from benchmarks import results
-from benchmarks.results import (
-    ResultRow,
-    Store,
-    arrays_hash,
-    identity,
-    map_arrays,
-    plain,
-    read_arrays,
-    trace_arrays,
-    write_arrays,
-)
+from benchmarks.archives import arrays_hash, map_arrays, read_arrays, trace_arrays, write_arrays
+from benchmarks.results import ResultRow, Store, identity, plain
 from parapoint.errors import InputError
 from parapoint.parameterization import Parameterization, PointParameterization, TracePoint
 from parapoint.surface import Mesh, PointCloud

@@ -13,8 +13,9 @@ import pytest
 
 from baselines import registry
 from benchmarks import worker
+from benchmarks.archives import read_map, read_surface
 from benchmarks.environment import ROOT
-from benchmarks.results import Store, measured, read_map, read_surface
+from benchmarks.results import Store, measured
 from parapoint.parameterization import Parameterization, PointParameterization
 from parapoint.surface import Mesh, PointCloud
 from parapoint.testing import sample_surfaces

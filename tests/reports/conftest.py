@@ -10,15 +10,8 @@ import igl
 import numpy as np
 import pytest
 
-from benchmarks.results import (
-    ResultRow,
-    Store,
-    arrays_hash,
-    identity,
-    map_arrays,
-    trace_arrays,
-    write_arrays,
-)
+from benchmarks.archives import arrays_hash, map_arrays, trace_arrays, write_arrays
+from benchmarks.results import ResultRow, Store, identity
 from parapoint.parameterization import Parameterization, TracePoint
 from parapoint.surface import Mesh
 from reports import clouds, pictures, render, style
