@@ -37,7 +37,7 @@ from parapoint.trainer import PRECISIONS, DivergedError, Step, Trainer, surface_
 
 logger = logging.getLogger("parapoint")
 
-FORMAT = 2
+FORMAT = 3
 """Version of saved models and checkpoints."""
 FEWEST_POINTS = 100
 """Distinct points that a fit needs."""
@@ -55,6 +55,8 @@ DESCENDING = 0.8
 """Share of the budget after which a computed map is improved no more."""
 COINCIDENT = 1e-6
 """Points of a computed map that agree to this, in radii of the cloud, count as one."""
+MOST_COMPARED = 1_000_000
+"""Rows of a cloud among which repetitions are counted."""
 CHECKPOINT_SECONDS = 60.0
 KEPT_MAPS = 8
 """Maps kept in the trace of `parameterize`."""
@@ -322,12 +324,12 @@ class ParaPoint:
         begun = time.monotonic()
         self.preset_, device = self._checked()
         surface = _surface(surface)
-        dropped = surface.dropped if isinstance(surface, PointCloud) else 0
+        left_out = _left_out(surface)
         if self.components != "together":
             parts = components(surface)
             if self.components == "each" and len(parts) > 1:
                 self._fit_each(parts, device, checkpoint, callback)
-                self.report_["dropped_not_finite"] = dropped
+                self.report_ |= left_out
                 return self
             if len(parts) > 1:
                 logger.warning("%d components: the largest is fitted", len(parts))
@@ -376,8 +378,7 @@ class ParaPoint:
         self.report_: dict[str, object] = {
             **self._report(trainer, device, time.monotonic() - begun),
             **found,
-            "dropped_not_finite": dropped,
-            "dropped_duplicates": self._duplicates,
+            **left_out,
         }
         if trainer.divergences:
             times = "once and went on with a smaller step" if trainer.divergences == 1 else "twice"
@@ -426,7 +427,6 @@ class ParaPoint:
             "components": len(models),
             "iterations": sum(int(str(m.report_["iterations"])) for m in models),
             "seconds": round(sum(float(str(m.report_["seconds"])) for m in models), 3),
-            "dropped_duplicates": sum(int(str(m.report_["dropped_duplicates"])) for m in models),
         }
 
     def _frame(self) -> None:
@@ -436,9 +436,7 @@ class ParaPoint:
 
     def _draw(self, surface: Surface, count: int) -> None:
         """Draw at most `count` training points of the surface."""
-        drawn = _drawn(surface, count, self.seed)
-        self.points_ = drawn[0]
-        self._duplicates: int = drawn[1]
+        self.points_ = training_points(surface, count, self.seed)
         self._frame()
 
     def _framed(self) -> FloatArray:
@@ -618,7 +616,7 @@ class ParaPoint:
             yield BATCH[device.type], device
 
 
-def training_points(surface: npt.ArrayLike | Surface, count: int, seed: int) -> FloatArray:
+def training_points(surface: Surface, count: int, seed: int) -> FloatArray:
     """(n, 3) distinct training points: at most `count`, drawn evenly without repetition.
 
     Of a cloud, from its points; of a mesh, from the vertices of its faces, or from the faces by
@@ -627,11 +625,6 @@ def training_points(surface: npt.ArrayLike | Surface, count: int, seed: int) -> 
     Raises:
         InputError: fewer than 100 distinct points, or all on a line.
     """
-    return _drawn(_surface(surface), count, seed)[0]
-
-
-def _drawn(surface: Surface, count: int, seed: int) -> tuple[FloatArray, int]:
-    """`training_points`, and how many of the points looked at repeat others."""
     rng = np.random.default_rng(seed)
     if isinstance(surface, Mesh):
         points = surface.vertices[surface.referenced]
@@ -648,10 +641,21 @@ def _drawn(surface: Surface, count: int, seed: int) -> tuple[FloatArray, int]:
     spread = np.linalg.svd(distinct - distinct.mean(axis=0), compute_uv=False)
     if spread[1] <= 1e-6 * spread[0]:
         raise InputError("all points lie on a line; a fit needs points of a surface")
-    duplicates = len(points) - len(distinct)
     if len(distinct) > count:
         distinct = distinct[np.sort(rng.choice(len(distinct), count, replace=False))]
-    return np.ascontiguousarray(distinct), duplicates
+    return np.ascontiguousarray(distinct)
+
+
+def _left_out(surface: Surface) -> dict[str, object]:
+    """How many rows of a cloud were not finite, and how many repeat others (of a million)."""
+    if isinstance(surface, Mesh):
+        return {"dropped_not_finite": 0, "dropped_duplicates": 0}
+    points = surface.points[:MOST_COMPARED]
+    ordered = points[np.lexsort(points.T)]
+    repeated = int((ordered[1:] == ordered[:-1]).all(axis=1).sum())
+    if repeated:
+        logger.warning("%d of %d points repeat others and count once", repeated, len(points))
+    return {"dropped_not_finite": surface.dropped, "dropped_duplicates": repeated}
 
 
 def _coordinates(values: npt.ArrayLike | Surface, columns: int) -> FloatArray:
