@@ -207,7 +207,7 @@ def normal_colours(scene: Scene, camera: Camera) -> Floats:
     """
     axes = camera.axes.astype(np.float32)
     normals = scene.corner_normals @ axes.T
-    sky = scene.coarse_openness[..., None]
+    sky = scene.coarse_openness[scene.mesh.faces, :1]
     colours = (0.5 + 0.42 * normals) * (0.30 + 0.70 * sky)
     return render.linear(np.clip(colours, 0, 1))
 
@@ -345,7 +345,8 @@ def draw_model(
     views = [scene.view(camera, SIZE, SAMPLES) for camera in cameras]
     for name, view in zip(files, views, strict=True):
         save(meshed(view), folder / name)
-    _write_script(folder / model_file(case, VIEWED), viewer.shape(surface, cameras[0]))
+    shape = viewer.shape(surface, cameras[0], scene.coarse_openness)
+    _write_script(folder / model_file(case, VIEWED), *shape)
     failed: list[str] = []
     faults: list[str] = []
     try:
@@ -382,7 +383,7 @@ def draw_model(
             made |= cloud_images(scene, views[0], found)
         for kind, image in made.items():
             save(image, folder / map_file(row, kind))
-        _write_script(folder / map_file(row, VIEWED), _viewed(found))
+        _write_script(folder / map_file(row, VIEWED), *_viewed(found))
     return failed, faults
 
 
@@ -415,8 +416,8 @@ def cloud_images(scene: Scene, view: View, found: Map) -> Mapping[str, Image]:
     return clouds.images(view, uv, found.spanning, colours, FIELDS / scene.size)
 
 
-def _viewed(found: Map) -> dict[str, object]:
-    """A map as the viewer draws it."""
+def _viewed(found: Map) -> tuple[dict[str, object], viewer.Arrays]:
+    """Facts and arrays of a map, as the viewer draws it."""
     return viewer.uv_map(
         found.mesh,
         found.parameterization,
@@ -430,8 +431,8 @@ def _viewed(found: Map) -> dict[str, object]:
     )
 
 
-def _write_script(path: Path, content: dict[str, object]) -> None:
-    path.write_text(viewer.script(path.name, content), encoding="utf-8")
+def _write_script(path: Path, facts: Mapping[str, object], arrays: viewer.Arrays) -> None:
+    path.write_text(viewer.script(path.name, facts, arrays), encoding="utf-8")
 
 
 def save(image: npt.NDArray[np.uint8], path: Path) -> None:
