@@ -6,6 +6,7 @@ import dataclasses
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -18,7 +19,7 @@ from benchmarks.results import ResultRow, Store
 from benchmarks.suites import SUITES
 from parapoint.errors import InputError
 from parapoint.parameterization import Parameterization
-from parapoint.surface import Mesh
+from parapoint.surface import Mesh, PointCloud
 
 ANGLE, AREA = "angle_difference_mean", "area_discrepancy_total"
 FLIPPED, SPANNING = "flipped_fraction", "spanning_fraction"
@@ -211,6 +212,16 @@ class Contents:
                     return None
                 return surface if isinstance(surface, Mesh) else None
         return None
+
+    @cached_property
+    def clouds(self) -> frozenset[str]:
+        """The models that are clouds of points."""
+        found = set()
+        for case, row in {row.case: row for row in self.rows if row.surface_hash}.items():
+            with suppress(InputError):
+                if isinstance(self.store.surface(row), PointCloud):
+                    found.add(case)
+        return frozenset(found)
 
     def mapped(self, row: ResultRow) -> tuple[Mesh, Parameterization] | None:
         """The mesh of a cell and its map; None where one is damaged or they do not fit."""

@@ -163,8 +163,9 @@ class Scene:
     """
 
     def __init__(self, mesh: Mesh, *, shadows: bool = True) -> None:
-        """A scene of `mesh`; without `shadows` for pictures that are not lit."""
+        """A scene of `mesh`; without `shadows` nothing keeps the sky from any of it."""
         self.mesh = mesh
+        self._shadows = shadows
         self.fine = split(mesh, FINE_FACES if shadows else 0)
         self.rays = Rays(self.fine.mesh)
         low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
@@ -189,6 +190,8 @@ class Scene:
         Cosine-weighted, over directions that are the same for every vertex: smooth, no noise.
         """
         mesh = self.fine.mesh
+        if not self._shadows:
+            return np.ones((len(mesh.vertices), 2), dtype=np.float32)
         normals = _unit(np.asarray(igl.per_vertex_normals(mesh.vertices, mesh.faces)))
         count = int(np.clip(OCCLUSION_RAYS // len(normals), 32, 128))
         directions = sphere_directions(count)

@@ -77,7 +77,7 @@ def put(place: Axes, path: Path) -> None:
     try:
         with Images.open(path) as image:
             box = place.get_window_extent()
-            scale = STYLE["savefig.dpi"] / mpl.rcParams["figure.dpi"]
+            scale = mpl.rcParams["savefig.dpi"] / mpl.rcParams["figure.dpi"]
             shown = image.convert("RGBA")
             shown.thumbnail((round(box.width * scale), round(box.height * scale)))
             white = Images.new("RGBA", shown.size, "white")

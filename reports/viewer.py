@@ -21,9 +21,10 @@ from scipy.sparse import csgraph
 
 from parapoint.parameterization import Parameterization
 from parapoint.surface import BoolArray, FloatArray, IntArray, Mesh, edge_table
-from reports.render import Camera
+from reports.render import Camera, Floats
 
-Arrays = Mapping[str, npt.NDArray[Any]]
+Script = tuple[Mapping[str, object], Mapping[str, npt.NDArray[Any]]]
+"""Facts and arrays of a `script`."""
 
 LARGEST = 200_000
 """Most faces of a model that the viewer is given; larger ones have their pictures only."""
@@ -35,7 +36,7 @@ POSITION_BITS, UV_BITS, SKY_BITS = 16, 14, 8
 """Of a coordinate in space, of one in the plane, and of the light that reaches a vertex."""
 
 
-def script(name: str, facts: Mapping[str, object], arrays: Arrays) -> str:
+def script(name: str, facts: Mapping[str, object], arrays: Mapping[str, npt.NDArray[Any]]) -> str:
     """The file `name`, which puts an object under that name into `received`.
 
     Its entries: `facts`; `arrays`, the bytes of an item, rows and columns of each of `arrays`
@@ -101,7 +102,7 @@ def surprises(places: IntArray, corners: IntArray, bits: int) -> npt.NDArray[Any
     half = 2 ** (bits - 1)
     wrong = padded[row] - padded[one] - padded[two] + padded[three]
     wrong = (wrong + half) % (2 * half) - half
-    return np.where(wrong < 0, -2 * wrong - 1, 2 * wrong).astype(np.uint16)
+    return np.asarray(np.where(wrong < 0, -2 * wrong - 1, 2 * wrong), dtype=np.uint16)
 
 
 def quantised(points: FloatArray, bits: int) -> tuple[dict[str, object], IntArray]:
@@ -140,7 +141,7 @@ def ordered(mesh: Mesh) -> tuple[Mesh, IntArray, IntArray]:
     return Mesh(mesh.vertices[old[met]], rank[number].reshape(-1, 3)), face, old[met]
 
 
-def shape(mesh: Mesh, camera: Camera, sky: FloatArray) -> tuple[dict[str, object], Arrays]:
+def shape(mesh: Mesh, camera: Camera, sky: Floats) -> Script:
     """Facts and arrays of a model: itself, the camera that looks at it first, and its `sky`.
 
     That is (V, 2): how much light of the sky reaches the front and the back of a vertex, 0 to 1.
@@ -195,7 +196,7 @@ def uv_map(
     distortion: dict[str, tuple[FloatArray, float, float]],
     spanning: BoolArray,
     flipped: BoolArray,
-) -> tuple[dict[str, object], Arrays]:
+) -> Script:
     """A map as it is drawn: facts and arrays of its `script`.
 
     Args:
