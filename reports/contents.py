@@ -23,6 +23,9 @@ from parapoint.surface import Mesh, PointCloud
 
 ANGLE, AREA = "angle_difference_mean", "area_discrepancy_total"
 FLIPPED, SPANNING = "flipped_fraction", "spanning_fraction"
+ISOMETRIC = "symmetric_dirichlet"
+POINT_ANGLE, POINT_AREA = "local_quasi_conformal_mean", "local_area_log_ratio_mean"
+POINT_COLLISIONS, POINT_TEARS = "uv_collision_fraction", "spanning_point_fraction"
 
 DISPLAY: dict[str, tuple[str, str]] = {
     "tutte": ("Tutte", "uniform weights"),
@@ -38,6 +41,7 @@ DISPLAY: dict[str, tuple[str, str]] = {
     "meshlab_voronoi": ("MeshLab Voronoi atlas", "many charts"),
     "meshlab_triangles": ("MeshLab triangles", "a chart for each face"),
     "external": ("External", ""),
+    "meshed": ("Meshed", ""),
     "fam": ("FAM", ""),
     "parapoint": ("ParaPoint", ""),
 }
@@ -46,7 +50,16 @@ DISPLAY: dict[str, tuple[str, str]] = {
 The order is that of the tables; methods from elsewhere stand between, ParaPoint last.
 """
 
-TOLD = ("preset", "energy", "loss", "iterations", "points", "time_budget")
+TOLD = (
+    "reconstruction",
+    "flattening",
+    "preset",
+    "energy",
+    "loss",
+    "iterations",
+    "points",
+    "time_budget",
+)
 """Parameters, or entries of a method's report, that are part of its name in a table."""
 
 

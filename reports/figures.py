@@ -312,7 +312,8 @@ def write(folder: Path, coarse: bool, drawing: Drawing) -> None:
         content = io.BytesIO()
         made.savefig(content, format="png")
         with Images.open(content) as image:
-            few = image.convert("RGB").quantize(256, dither=Images.Dither.NONE)
+            whole = image.convert("RGB")
+            few = whole.quantize(palette=whole.quantize(256), dither=Images.Dither.FLOYDSTEINBERG)
             few.save(files[1], optimize=True, dpi=image.info["dpi"])
         lighten(made)
         made.savefig(files[0], metadata={"CreationDate": None, "Title": drawing.title})

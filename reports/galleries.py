@@ -12,7 +12,17 @@ from matplotlib.figure import Figure
 
 from benchmarks.results import ResultRow
 from parapoint.preparation import CUT
-from reports.contents import ANGLE, AREA, FLIPPED, Contents, Label
+from reports.contents import (
+    ANGLE,
+    AREA,
+    FLIPPED,
+    POINT_ANGLE,
+    POINT_AREA,
+    POINT_COLLISIONS,
+    POINT_TEARS,
+    Contents,
+    Label,
+)
 from reports.pictures import (
     ANGLE_SCALE,
     AREA_SCALE,
@@ -44,11 +54,17 @@ def leading(contents: Contents, method: str) -> Label | None:
 
 
 def values_text(contents: Contents, row: ResultRow) -> str:
-    """Angle, area and flips of a cell in a line or two, as they stand below its pictures."""
+    """Angle, area and flips of a cell in a few lines, as they stand below its pictures."""
     cells = contents.measured[contents.measured["id"] == row.id]
     if cells.empty:
         return ""
     cell = cells.iloc[0]
+    if row.case in contents.clouds:
+        shares = [f"tears at {100 * cell[POINT_TEARS]:.2g}%"] if cell[POINT_TEARS] > 0 else []
+        if cell[POINT_COLLISIONS] > 0:
+            shares.append(f"collisions {100 * cell[POINT_COLLISIONS]:.2g}%")
+        first = f"stretch {cell[POINT_ANGLE]:.2f}   area {cell[POINT_AREA]:.2f}"
+        return "\n".join([first, *shares])
     if not np.isfinite(cell[[ANGLE, AREA, FLIPPED]].to_numpy(dtype=float)).all():
         return "no finite values"
     lines = [f"angle {cell[ANGLE]:.3f}   area {cell[AREA]:.2f}"]

@@ -25,7 +25,7 @@ from benchmarks.metrics import MapState
 from benchmarks.results import ResultRow, Store
 from parapoint.errors import InputError
 from parapoint.parameterization import Parameterization
-from parapoint.surface import BoolArray, FloatArray, Mesh, PointCloud
+from parapoint.surface import BoolArray, FloatArray, Mesh, PointCloud, edge_table
 from reports import clouds, render, viewer
 from reports.contents import Contents
 from reports.render import Camera, Floats, Image, Scene, View
@@ -191,14 +191,9 @@ class Layout:
 def _outline(found: Map) -> FloatArray:
     """(n, 2, 3) the edges around the charts, at the height of `Layout`."""
     kept = ~found.spanning
-    corners = found.parameterization.corners[kept]
-    halfedges = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2)
-    _, first, count = np.unique(
-        np.sort(halfedges, axis=1), axis=0, return_index=True, return_counts=True
-    )
-    lone = first[count == 1]
+    _, edge, count = edge_table(found.parameterization.corners[kept])
     uv = found.uv[kept]
-    ends = np.stack([uv, np.roll(uv, -1, axis=1)], axis=2).reshape(-1, 2, 2)[lone]
+    ends = np.stack([uv, np.roll(uv, -1, axis=1)], axis=2).reshape(-1, 2, 2)[count[edge] == 1]
     return np.concatenate([ends, np.zeros((len(ends), 2, 1))], axis=2)
 
 

@@ -87,7 +87,7 @@ def camera(mesh: Mesh, toward: FloatArray, up: FloatArray, margin: float = 1.04)
     right = np.cross(up, back)
     right = right / np.linalg.norm(right)
     axes = np.stack([right, np.cross(back, right), back])
-    seen = mesh.vertices[np.unique(mesh.faces)] @ axes.T
+    seen = mesh.vertices[mesh.referenced] @ axes.T
     low, high = seen.min(axis=0), seen.max(axis=0)
     half = np.maximum((high - low)[:2] / 2, (high - low).max() / 8) * margin
     return Camera(axes=axes, centre=(low + high) / 2 @ axes, half=half)
