@@ -313,7 +313,9 @@ def write(folder: Path, coarse: bool, drawing: Drawing) -> None:
         made.savefig(content, format="png")
         with Images.open(content) as image:
             whole = image.convert("RGB")
-            few = whole.quantize(palette=whole.quantize(256), dither=Images.Dither.FLOYDSTEINBERG)
+            colours = whole.quantize(255)
+            colours.putpalette([*(colours.getpalette() or [])[: 3 * 255], 255, 255, 255])
+            few = whole.quantize(palette=colours, dither=Images.Dither.FLOYDSTEINBERG)
             few.save(files[1], optimize=True, dpi=image.info["dpi"])
         lighten(made)
         made.savefig(files[0], metadata={"CreationDate": None, "Title": drawing.title})
