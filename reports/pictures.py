@@ -7,6 +7,7 @@ or the source of the renderer has changed.
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -276,12 +277,14 @@ def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
     source = source_hash("render", "pictures", "clouds", "viewer")
     with_heat = len(contents.cases) <= SHEETS
     work: list[list[ResultRow]] = []
+    wanting: list[list[str]] = []
     keys: dict[str, str] = {}
     for case in contents.cases:
         rows = [row for row in contents.rows if row.case == case and row.surface_hash]
         if not rows:
             continue
-        todo = []
+        todo: list[ResultRow] = []
+        missing: list[str] = []
         latest, points = rows[-1], case in contents.clouds
         artist = contents.store.reference_path(latest.surface_hash).exists()
         names = [model_file(case, kind) for kind in model_kinds(points=points, artist=artist)]
@@ -294,19 +297,29 @@ def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
         for name, (row, content) in wanted.items():
             text = f"{source} {row.surface_hash} {content}"
             keys[name] = hashlib.sha256(text.encode()).hexdigest()[:16]
-            if (known.get(name) != keys[name] or not (folder / name).exists()) and row not in todo:
-                todo.append(row)
+            if known.get(name) != keys[name] or not (folder / name).exists():
+                missing.append(name)
+                if row not in todo:
+                    todo.append(row)
         if todo:
             work.append(todo)
+            wanting.append(missing)
     faults: list[str] = []
-    for failed, said in _results(contents.store, work, folder, with_heat, jobs):
+    done = {name: keys[name] for name in keys.keys() - set(itertools.chain(*wanting))}
+    made = _results(contents.store, work, folder, with_heat, jobs)
+    for missing, (failed, said) in zip(wanting, made, strict=True):
         faults += said
-        for name in failed:
-            keys.pop(name, None)
-    for name in known.keys() - keys.keys():  # of a cell that gave way to a newer one
+        done |= {name: keys[name] for name in set(missing).difference(failed)}
+        _note(record, known | done)  # a report that is stopped goes on where it was
+    for name in known.keys() - done.keys():  # of a cell that gave way to a newer one
         (folder / name).unlink(missing_ok=True)
-    record.write_text(json.dumps(keys, indent=0, sort_keys=True) + "\n")
+    _note(record, done)
     return faults
+
+
+def _note(record: Path, keys: Mapping[str, str]) -> None:
+    """Keep what `known_keys` is to return."""
+    record.write_text(json.dumps(keys, indent=0, sort_keys=True) + "\n")
 
 
 def known_keys(record: Path) -> dict[str, str]:
