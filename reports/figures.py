@@ -313,8 +313,9 @@ def write(folder: Path, coarse: bool, drawing: Drawing) -> None:
         made.savefig(content, format="png")
         with Images.open(content) as image:
             whole = image.convert("RGB")
-            colours = whole.quantize(255)
-            colours.putpalette([*(colours.getpalette() or [])[: 3 * 255], 255, 255, 255])
+            colours = whole.quantize(256)
+            levels = colours.getpalette() or []
+            colours.putpalette([255 if level > 247 else level for level in levels])  # white paper
             few = whole.quantize(palette=colours, dither=Images.Dither.FLOYDSTEINBERG)
             few.save(files[1], optimize=True, dpi=image.info["dpi"])
         lighten(made)
