@@ -166,7 +166,8 @@ def test_a_cloud_has_pictures_and_metrics_of_points(tmp_path):
     text = parsed(index).text
     assert "Angles at points" in text
     assert "Conformality" not in text  # it has no triangles
-    page = is_whole(index.parent / "models/paper/scan.html")
+    page = parsed(index.parent / "models/paper/scan.html")
+    assert all((index.parent / "models/paper" / a.split("#")[0]).exists() for a in page.addresses)
     assert "a cloud has pictures alone" in page.text
     assert page.text.count("where the map tears") == 2
     assert "local σ1/σ2" in page.text
