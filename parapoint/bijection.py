@@ -9,6 +9,8 @@ nearly conformal, the descent on the conformal energy then finds one of even sca
 
 from __future__ import annotations
 
+import math
+import time
 from typing import Any
 
 import igl
@@ -35,8 +37,10 @@ class BijectionError(RuntimeError):
     """No bijective map was found; the message says why."""
 
 
-def bijective_map(mesh: Mesh) -> FloatArray:
+def bijective_map(mesh: Mesh, deadline: float = math.inf) -> FloatArray:
     """(V, 2) a bijective map of a connected planar domain, faces counter-clockwise.
+
+    No step begins after `deadline`, a time of `time.monotonic`: the map is then as far as it came.
 
     Raises:
         BijectionError: a face is flat, or in Tutte's embedding too small for numbers.
@@ -51,8 +55,8 @@ def bijective_map(mesh: Mesh) -> FloatArray:
         raise BijectionError("its embedding in the disk has flat triangles")
     start = uv = uv / np.sqrt(areas.sum())
     for energy in DESCENTS:
-        uv = _descended(mesh, uv, energy)
-    if uv is start:
+        uv = _descended(mesh, uv, energy, deadline)
+    if uv is start and time.monotonic() < deadline:
         raise BijectionError("no step lowers its distortion")
     return np.asarray(size * uv)
 
@@ -92,7 +96,9 @@ def signed_areas(uv: FloatArray, faces: IntArray) -> FloatArray:
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
 
 
-def _descended(mesh: Mesh, uv: FloatArray, energy: igl.MappingEnergyType) -> FloatArray:
+def _descended(
+    mesh: Mesh, uv: FloatArray, energy: igl.MappingEnergyType, deadline: float
+) -> FloatArray:
     """(V, 2) the bijective map `uv` (V, 2) moved down an energy."""
     state = triangle.SCAFData()
     triangle.scaf_precompute(
@@ -107,6 +113,8 @@ def _descended(mesh: Mesh, uv: FloatArray, energy: igl.MappingEnergyType) -> Flo
     )
     before = np.inf
     for _ in range(MOST_STEPS):
+        if time.monotonic() > deadline:
+            break
         moved = np.array(triangle.scaf_solve(1, state)[:, :2])
         if not (signed_areas(moved, mesh.faces) > 0).all():  # nor if not a number
             break
