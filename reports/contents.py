@@ -6,6 +6,7 @@ import dataclasses
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -18,10 +19,13 @@ from benchmarks.results import ResultRow, Store
 from benchmarks.suites import SUITES
 from parapoint.errors import InputError
 from parapoint.parameterization import Parameterization
-from parapoint.surface import Mesh
+from parapoint.surface import Mesh, PointCloud
 
 ANGLE, AREA = "angle_difference_mean", "area_discrepancy_total"
 FLIPPED, SPANNING = "flipped_fraction", "spanning_fraction"
+ISOMETRIC = "symmetric_dirichlet"
+POINT_ANGLE, POINT_AREA = "local_quasi_conformal_mean", "local_area_log_ratio_mean"
+POINT_COLLISIONS, POINT_TEARS = "uv_collision_fraction", "spanning_point_fraction"
 
 DISPLAY: dict[str, tuple[str, str]] = {
     "tutte": ("Tutte", "uniform weights"),
@@ -37,6 +41,7 @@ DISPLAY: dict[str, tuple[str, str]] = {
     "meshlab_voronoi": ("MeshLab Voronoi atlas", "many charts"),
     "meshlab_triangles": ("MeshLab triangles", "a chart for each face"),
     "external": ("External", ""),
+    "meshed": ("Meshed", ""),
     "fam": ("FAM", ""),
     "parapoint": ("ParaPoint", ""),
 }
@@ -45,7 +50,16 @@ DISPLAY: dict[str, tuple[str, str]] = {
 The order is that of the tables; methods from elsewhere stand between, ParaPoint last.
 """
 
-TOLD = ("preset", "energy", "loss", "iterations", "points", "time_budget")
+TOLD = (
+    "reconstruction",
+    "flattening",
+    "preset",
+    "energy",
+    "loss",
+    "iterations",
+    "points",
+    "time_budget",
+)
 """Parameters, or entries of a method's report, that are part of its name in a table."""
 
 
@@ -211,6 +225,16 @@ class Contents:
                     return None
                 return surface if isinstance(surface, Mesh) else None
         return None
+
+    @cached_property
+    def clouds(self) -> frozenset[str]:
+        """The models that are clouds of points."""
+        found = set()
+        for case, row in {row.case: row for row in self.rows if row.surface_hash}.items():
+            with suppress(InputError):
+                if isinstance(self.store.surface(row), PointCloud):
+                    found.add(case)
+        return frozenset(found)
 
     def mapped(self, row: ResultRow) -> tuple[Mesh, Parameterization] | None:
         """The mesh of a cell and its map; None where one is damaged or they do not fit."""

@@ -7,6 +7,7 @@ colour-blind tell apart, and never colour alone.
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -17,6 +18,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
+from PIL import Image as Images
 
 from benchmarks.results import ResultRow
 from reports.clouds import DENSE, SPARSE
@@ -34,6 +36,7 @@ from reports.galleries import (
 )
 from reports.pictures import SHEETS, known_keys, slug, source_hash
 from reports.plots import area_convergence, convergence, cost, losses, pareto, singular_values
+from reports.published import published_values
 from reports.style import STYLE, lighten
 
 
@@ -93,14 +96,15 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
         "be told; faces that span a learned seam are left pale there and lie below the others."
     )
     cases = contents.cases
-    whole = [case for case in cases if not is_cut(contents, case)]
+    meshes = [case for case in cases if case not in contents.clouds]
+    whole = [case for case in meshes if not is_cut(contents, case)]
     several = partial(paged, contents)
 
     found = [
         *several(
             "models",
             "Test models",
-            "The models from two sides, with their mesh edges.",
+            "The models from two sides, meshes with their edges.",
             make=partial(models, contents, pictures),
             cases=cases,
             size=MODELS,
@@ -120,7 +124,9 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
             "true normals, which it does not get. (b) Their uv, in the same colours. (c) The "
             f"checkerboard on {DENSE:,} points. (d) Green: points of the faces that span a learned "
             "seam. The uv of a point is interpolated in its face, or is that of the nearest corner "
-            "where the face spans a seam: the results hold no network that could be asked.",
+            "where the face spans a seam: the results hold no network that could be asked. Where "
+            "the model is a cloud itself, (c) shows its own points as disks, and (d) those where "
+            "the map tears between neighbours.",
             make=partial(clouds, contents, pictures),
             cases=cases,
             size=ROWS,
@@ -146,9 +152,11 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
                 partial(ablation_of_the_paper, contents, pictures),
             ),
         ]
+    sheets = cases if len(cases) <= SHEETS else []
     for case in cases:
         rows = tuple(row for row in contents.rows if row.case == case)
-        if is_cut(contents, case) or contents.has_artist(case):
+        told = case in sheets or published_values(case)
+        if told and (is_cut(contents, case) or contents.has_artist(case)):
             found.append(
                 Drawing(
                     f"cut-{slug(case)}",
@@ -204,7 +212,7 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
             "the smaller as a line, heights relative to the higher peak of each row. An isometry "
             "is one peak at 1; a conformal map moves both together.",
             make=partial(singular_values, contents),
-            cases=cases,
+            cases=meshes,
             size=PANELS,
         ),
         Drawing(
@@ -215,18 +223,21 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
             partial(cost, contents),
         ),
     ]
-    sheets = contents.cases if len(contents.cases) <= SHEETS else []
     for case in sheets:
         rows = tuple(row for row in contents.rows if row.case == case)
-        if any(row.status == "ok" for row in rows):
-            found += [
-                Drawing(
-                    f"maps-{slug(case)}",
-                    f"{case}: all methods",
-                    f"All methods on {case}. {checker}",
-                    rows,
-                    partial(maps, contents, case, pictures),
-                ),
+        if not any(row.status == "ok" for row in rows):
+            continue
+        found.append(
+            Drawing(
+                f"maps-{slug(case)}",
+                f"{case}: all methods",
+                f"All methods on {case}. {checker}",
+                rows,
+                partial(maps, contents, case, pictures),
+            )
+        )
+        if case in meshes:
+            found.append(
                 Drawing(
                     f"heat-{slug(case)}",
                     f"{case}: where the distortion is",
@@ -235,8 +246,8 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
                     "seam left out (grey on the surface).",
                     rows,
                     partial(heat_maps, contents, case, pictures),
-                ),
-            ]
+                )
+            )
     return found
 
 
@@ -266,12 +277,13 @@ def draw(contents: Contents, pictures: Path, folder: Path, jobs: int) -> list[Dr
         keys[drawing.name] = hashlib.sha256(text.encode()).hexdigest()[:16]
         if known.get(drawing.name) != keys[drawing.name]:
             changed.append(drawing)
+    make = partial(write, folder, len(contents.cases) > SHEETS)
     if jobs > 1 and len(changed) > 1:
         with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-            list(pool.map(partial(write, folder), changed))
+            list(pool.map(make, changed))
     else:
         for drawing in changed:
-            write(folder, drawing)
+            make(drawing)
     record.write_text(json.dumps(keys, indent=0, sort_keys=True) + "\n")
     drawn = [
         Drawn(one.name, one.title, one.caption)
@@ -283,18 +295,28 @@ def draw(contents: Contents, pictures: Path, folder: Path, jobs: int) -> list[Dr
     return drawn
 
 
-def write(folder: Path, drawing: Drawing) -> None:
-    """Write a figure as PDF and PNG; the same figure gives the same bytes."""
+def write(folder: Path, coarse: bool, drawing: Drawing) -> None:
+    """Write a figure as PDF and PNG; the same figure gives the same bytes.
+
+    Sheets of many pictures, and all figures if `coarse`, are not as fine: they are most of the
+    weight. So are colours beyond 256, which no eye misses.
+    """
     files = [folder / f"{drawing.name}.{kind}" for kind in ("pdf", "png")]
-    with mpl.rc_context(STYLE):
+    sheet = coarse or drawing.name.startswith(("maps-", "heat-"))
+    with mpl.rc_context(STYLE | {"savefig.dpi": STYLE["savefig.dpi"] * (0.7 if sheet else 1.0)}):
         made = drawing.figure()
         if made is None:
             for file in files:
                 file.unlink(missing_ok=True)
             return
-        # A sheet of many pictures need not be as fine as a figure: they are most of the weight.
-        sheet = drawing.name.startswith(("maps-", "heat-"))
-        dpi = STYLE["savefig.dpi"] * (0.7 if sheet else 1.0)
-        made.savefig(files[1], dpi=dpi, metadata={"Title": drawing.title})
+        content = io.BytesIO()
+        made.savefig(content, format="png")
+        with Images.open(content) as image:
+            whole = image.convert("RGB")
+            colours = whole.quantize(256)
+            levels = colours.getpalette() or []
+            colours.putpalette([255 if level > 247 else level for level in levels])  # white paper
+            few = whole.quantize(palette=colours, dither=Images.Dither.FLOYDSTEINBERG)
+            few.save(files[1], optimize=True, dpi=image.info["dpi"])
         lighten(made)
-        made.savefig(files[0], dpi=dpi, metadata={"CreationDate": None, "Title": drawing.title})
+        made.savefig(files[0], metadata={"CreationDate": None, "Title": drawing.title})

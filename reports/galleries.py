@@ -12,7 +12,17 @@ from matplotlib.figure import Figure
 
 from benchmarks.results import ResultRow
 from parapoint.preparation import CUT
-from reports.contents import ANGLE, AREA, FLIPPED, Contents, Label
+from reports.contents import (
+    ANGLE,
+    AREA,
+    FLIPPED,
+    POINT_ANGLE,
+    POINT_AREA,
+    POINT_COLLISIONS,
+    POINT_TEARS,
+    Contents,
+    Label,
+)
 from reports.pictures import (
     ANGLE_SCALE,
     AREA_SCALE,
@@ -44,11 +54,17 @@ def leading(contents: Contents, method: str) -> Label | None:
 
 
 def values_text(contents: Contents, row: ResultRow) -> str:
-    """Angle, area and flips of a cell in a line or two, as they stand below its pictures."""
+    """Angle, area and flips of a cell in a few lines, as they stand below its pictures."""
     cells = contents.measured[contents.measured["id"] == row.id]
     if cells.empty:
         return ""
     cell = cells.iloc[0]
+    if row.case in contents.clouds:
+        shares = [f"tears at {100 * cell[POINT_TEARS]:.2g}%"] if cell[POINT_TEARS] > 0 else []
+        if cell[POINT_COLLISIONS] > 0:
+            shares.append(f"collisions {100 * cell[POINT_COLLISIONS]:.2g}%")
+        first = f"stretch {cell[POINT_ANGLE]:.2f}   area {cell[POINT_AREA]:.2f}"
+        return "\n".join([first, *shares])
     if not np.isfinite(cell[[ANGLE, AREA, FLIPPED]].to_numpy(dtype=float)).all():
         return "no finite values"
     lines = [f"angle {cell[ANGLE]:.3f}   area {cell[AREA]:.2f}"]
@@ -71,7 +87,7 @@ def pictures_of(
 
 
 def models(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure:
-    """The test models from two sides with their mesh edges."""
+    """The test models from two sides, meshes with their edges."""
     across = min(3, len(cases))
     down = -(-len(cases) // across)
     side, gap, foot = (WIDTH - 0.2) / 6, 0.02, 0.34
@@ -88,7 +104,10 @@ def models(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure:
                 pictures / model_file(case, kind),
             )
         surface = contents.mesh(case)
-        size = f"{len(surface.faces):,} faces, {surface.topology}" if surface else "not at hand"
+        if surface is not None:
+            size = f"{len(surface.faces):,} faces, {surface.topology}"
+        else:
+            size = "a cloud of points" if case in contents.clouds else "not at hand"
         middle = (x0 + side + gap / 2) / width
         made.text(middle, (y0 - 0.04) / height, case, ha="center", va="top", fontsize=8.5)
         made.text(
@@ -253,8 +272,10 @@ def ablation_of_the_paper(contents: Contents, pictures: Path) -> Figure | None:
 
 
 def maps(contents: Contents, case: str, pictures: Path) -> Figure:
-    """Every method on one model: UV layout and checkerboard from two sides."""
-    kinds = ("layout", "checker-1", "checker-2")
+    """Every method on one model: UV layout and checkerboard from two sides; of a cloud, points."""
+    kinds, heads = ("layout", "checker-1", "checker-2"), ["UV layout", "view 1", "view 2"]
+    if case in contents.clouds:
+        kinds, heads = ("cloud-uv", "dense", "seams"), ["UV", "texture", "where it tears"]
     rows = [
         (
             wrapped(label.short),
@@ -263,7 +284,7 @@ def maps(contents: Contents, case: str, pictures: Path) -> Figure:
         )
         for label in contents.methods
     ]
-    return picture_grid(["UV layout", "view 1", "view 2"], rows, side=1.5, left=1.4)
+    return picture_grid(heads, rows, side=1.5, left=1.4)
 
 
 def heat_maps(contents: Contents, case: str, pictures: Path) -> Figure:

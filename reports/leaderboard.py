@@ -10,20 +10,38 @@ from functools import cache
 from typing import Any
 
 from benchmarks.metrics import GROUPS, METRICS
-from reports.contents import ANGLE, AREA, FLIPPED, SPANNING, Contents, Label
+from reports.contents import (
+    ANGLE,
+    AREA,
+    FLIPPED,
+    ISOMETRIC,
+    POINT_ANGLE,
+    POINT_AREA,
+    POINT_COLLISIONS,
+    POINT_TEARS,
+    SPANNING,
+    Contents,
+    Label,
+)
 from reports.pictures import slug
 from reports.table import metric_column
 
 MEASURES = {
     "Angles": ANGLE,
     "Areas": AREA,
-    "Angles and areas": "symmetric_dirichlet",
+    "Angles and areas": ISOMETRIC,
     "One to one": "bijective",
+    "Angles at points": POINT_ANGLE,
+    "Areas at points": POINT_AREA,
     "Speed": "seconds",
 }
 """What the methods are compared by at first sight, and the metric that stands for it."""
 
-SHOWN = (ANGLE, AREA, "symmetric_dirichlet", FLIPPED, "overlapped_fraction", SPANNING, "seconds")
+SHOWN = (
+    *(ANGLE, AREA, ISOMETRIC, FLIPPED, "overlapped_fraction", SPANNING),
+    *(POINT_ANGLE, POINT_AREA, POINT_COLLISIONS, POINT_TEARS),
+    "seconds",
+)
 """The metrics that the leaderboard shows before any is chosen."""
 
 

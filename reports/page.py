@@ -43,6 +43,15 @@ SCALES = {
 }
 """Title, colours and range, and the ends in words, of each distortion in the viewer."""
 
+TILES = {"surface": "checker-1", "UV layout": "layout"}
+POINT_TILES = {
+    "points, by their normals": "cloud",
+    "UV": "cloud-uv",
+    "checkerboard": "dense",
+    "where the map tears": "seams",
+}
+"""What is shown of a map of a mesh, and of one of points: the kinds of the pictures."""
+
 ASSETS = ("style.css", "page.js", "viewer.js")
 """What all pages share."""
 
@@ -77,7 +86,7 @@ class Card:
         row: its cell.
         detail: its parameters that are told.
         map: address of what the viewer reads, from the page; "" where there is none.
-        pictures: addresses by kind.
+        pictures: addresses by what they show; of a mesh two, which the viewer takes the place of.
         numbers: the metrics of SHOWN.
         exports: name and address of its textured meshes, where they were written.
     """
@@ -201,7 +210,7 @@ class Section:
                     row,
                     ", ".join(part for part in (label.detail, seed) if part),
                     f"../../{viewed}" if viewed else "",
-                    {k: f"../../{self.picture(map_file(row, k))}" for k in ("checker-1", "layout")},
+                    self._pictures(row),
                     self._numbers(case, label, row),
                     [
                         (name, f"../../{address}")
@@ -210,6 +219,12 @@ class Section:
                 )
             )
         return found
+
+    def _pictures(self, row: ResultRow) -> dict[str, str]:
+        """The pictures of a map by what they show."""
+        shown = POINT_TILES if row.case in self.contents.clouds else TILES
+        found = {text: self.picture(map_file(row, kind)) for text, kind in shown.items()}
+        return {text: f"../../{address}" for text, address in found.items() if address}
 
     def _numbers(self, case: str, label: Label, row: ResultRow) -> list[Number]:
         """The metrics of SHOWN of a cell; what should be none is marked where there is some."""
@@ -329,6 +344,7 @@ def model_page(section: Section, case: str) -> str:
         for name, (title, scale, ends) in SCALES.items()
     }
     faults = [fault for fault in section.faults if fault.startswith(case)]
+    flat = "a cloud has pictures alone" if case in section.contents.clouds else ""
     return (
         _templates()
         .get_template("model.html")
@@ -342,13 +358,14 @@ def model_page(section: Section, case: str) -> str:
             modes=MODES.items(),
             scales=scales,
             shape=shape,
-            fault="; ".join(faults) or "no map of this model can be drawn",
+            fault="; ".join(faults) or flat or "no map of this model can be drawn",
             cards=cards,
             figures=section.figures_of(case),
             facts=_inline(
                 {
                     "shape": f"../../{shape}" if shape else "",
                     "levels": viewer.LEVELS,
+                    "sky": viewer.SKY_BITS,
                     "scales": {name: scale["colours"] for name, scale in scales.items()},
                     "limits": {name: scale["range"] for name, scale in scales.items()},
                 }

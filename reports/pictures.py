@@ -7,9 +7,10 @@ or the source of the renderer has changed.
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,7 +18,6 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib import colormaps
 from PIL import Image as Images
 
@@ -26,10 +26,13 @@ from benchmarks.metrics import MapState
 from benchmarks.results import ResultRow, Store
 from parapoint.errors import InputError
 from parapoint.parameterization import Parameterization
-from parapoint.surface import BoolArray, FloatArray, Mesh
+from parapoint.surface import BoolArray, FloatArray, Mesh, PointCloud, edge_table
 from reports import clouds, render, viewer
 from reports.contents import Contents
 from reports.render import Camera, Floats, Image, Scene, View
+
+Content = Image | viewer.Script
+"""What is in a file beside the pictures: one of them, or what the viewer reads."""
 
 SIZE, SAMPLES = 360, 2
 """Longer side of a picture in pixels (what the largest figure prints), samples along a pixel."""
@@ -189,14 +192,9 @@ class Layout:
 def _outline(found: Map) -> FloatArray:
     """(n, 2, 3) the edges around the charts, at the height of `Layout`."""
     kept = ~found.spanning
-    corners = found.parameterization.corners[kept]
-    halfedges = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2)
-    _, first, count = np.unique(
-        np.sort(halfedges, axis=1), axis=0, return_index=True, return_counts=True
-    )
-    lone = first[count == 1]
+    _, edge, count = edge_table(found.parameterization.corners[kept])
     uv = found.uv[kept]
-    ends = np.stack([uv, np.roll(uv, -1, axis=1)], axis=2).reshape(-1, 2, 2)[lone]
+    ends = np.stack([uv, np.roll(uv, -1, axis=1)], axis=2).reshape(-1, 2, 2)[count[edge] == 1]
     return np.concatenate([ends, np.zeros((len(ends), 2, 1))], axis=2)
 
 
@@ -207,7 +205,7 @@ def normal_colours(scene: Scene, camera: Camera) -> Floats:
     """
     axes = camera.axes.astype(np.float32)
     normals = scene.corner_normals @ axes.T
-    sky = scene.coarse_openness[..., None]
+    sky = scene.coarse_openness[scene.mesh.faces, :1]
     colours = (0.5 + 0.42 * normals) * (0.30 + 0.70 * sky)
     return render.linear(np.clip(colours, 0, 1))
 
@@ -218,16 +216,31 @@ HEAT_PICTURES = ("angle", "angle-uv", "area", "area-uv")
 ARTIST_PICTURES = ("artist-checker-1", "artist-layout")
 CLOUD_PICTURES = ("cloud", "cloud-uv", "dense", "seams")
 SHEETS = 12
-"""Most models of a suite for which each gets figures of its own, and so pictures of its heat."""
+"""Most models of a suite for which each has figures of its own, and all pictures for them."""
 
 VIEWED = "view"
 """Kind of the file beside the pictures that the viewer reads, of a model and of a map."""
 
 
-def kinds(row: ResultRow, *, with_heat: bool) -> tuple[str, ...]:
-    """The pictures of a cell: of points, too, for the one method that sees points alone."""
-    heat_kinds = HEAT_PICTURES if with_heat else ()
-    return (*TEXTURED_PICTURES, *heat_kinds, *CLOUD_PICTURES * (row.method == "parapoint"))
+def model_kinds(*, points: bool, artist: bool) -> tuple[str, ...]:
+    """The files of a model: of `points`, the `artist`'s own map if there is one."""
+    return MODEL_PICTURES + (VIEWED,) * (not points) + ARTIST_PICTURES * artist
+
+
+def map_kinds(method: str, *, points: bool, with_heat: bool) -> tuple[str, ...]:
+    """The files of a map, of `points` or of a mesh: of both, for the one method that sees points.
+
+    Without the figures of a model the second view of other methods is in none.
+    """
+    if points:
+        return CLOUD_PICTURES
+    second_view = with_heat or method in {"slim", "parapoint"}
+    return (
+        *(kind for kind in TEXTURED_PICTURES if second_view or kind != "checker-2"),
+        *HEAT_PICTURES * with_heat,
+        *CLOUD_PICTURES * (method == "parapoint"),
+        VIEWED,
+    )
 
 
 def model_file(case: str, kind: str) -> str:
@@ -264,36 +277,49 @@ def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
     source = source_hash("render", "pictures", "clouds", "viewer")
     with_heat = len(contents.cases) <= SHEETS
     work: list[list[ResultRow]] = []
+    wanting: list[list[str]] = []
     keys: dict[str, str] = {}
     for case in contents.cases:
         rows = [row for row in contents.rows if row.case == case and row.surface_hash]
         if not rows:
             continue
-        todo = []
-        latest = rows[-1]
-        wanted = {model_file(case, kind): (latest, "") for kind in (*MODEL_PICTURES, VIEWED)}
-        if contents.store.reference_path(latest.surface_hash).exists():
-            wanted |= {model_file(case, kind): (latest, "artist") for kind in ARTIST_PICTURES}
+        todo: list[ResultRow] = []
+        missing: list[str] = []
+        latest, points = rows[-1], case in contents.clouds
+        artist = contents.store.reference_path(latest.surface_hash).exists()
+        names = [model_file(case, kind) for kind in model_kinds(points=points, artist=artist)]
+        wanted = dict.fromkeys(names, (latest, str(artist)))
         for row in rows:
             if row.status == "ok":
-                names = (map_file(row, kind) for kind in (*kinds(row, with_heat=with_heat), VIEWED))
-                wanted |= dict.fromkeys(names, (row, row.uv_sha256))
+                own = map_kinds(row.method, points=points, with_heat=with_heat)
+                files = (map_file(row, kind) for kind in own)
+                wanted |= dict.fromkeys(files, (row, row.uv_sha256))
         for name, (row, content) in wanted.items():
             text = f"{source} {row.surface_hash} {content}"
             keys[name] = hashlib.sha256(text.encode()).hexdigest()[:16]
-            if (known.get(name) != keys[name] or not (folder / name).exists()) and row not in todo:
-                todo.append(row)
+            if known.get(name) != keys[name] or not (folder / name).exists():
+                missing.append(name)
+                if row not in todo:
+                    todo.append(row)
         if todo:
             work.append(todo)
+            wanting.append(missing)
     faults: list[str] = []
-    for failed, said in _results(contents.store, work, folder, with_heat, jobs):
+    done = {name: keys[name] for name in keys.keys() - set(itertools.chain(*wanting))}
+    made = _results(contents.store, work, folder, with_heat, jobs)
+    for missing, (failed, said) in zip(wanting, made, strict=True):
         faults += said
-        for name in failed:
-            keys.pop(name, None)
-    for name in known.keys() - keys.keys():  # of a cell that gave way to a newer one
+        done |= {name: keys[name] for name in set(missing).difference(failed)}
+        _note(record, known | done)  # a report that is stopped goes on where it was
+    for name in known.keys() - done.keys():  # of a cell that gave way to a newer one
         (folder / name).unlink(missing_ok=True)
-    record.write_text(json.dumps(keys, indent=0, sort_keys=True) + "\n")
+    _note(record, done)
     return faults
+
+
+def _note(record: Path, keys: Mapping[str, str]) -> None:
+    """Keep what `known_keys` is to return."""
+    record.write_text(json.dumps(keys, indent=0, sort_keys=True) + "\n")
 
 
 def known_keys(record: Path) -> dict[str, str]:
@@ -324,99 +350,102 @@ def draw_model(
     """Draw a model and the maps of `rows`; the files that could not be drawn, and why."""
     store = Store(results)
     case = rows[0].case
-    files = [model_file(case, kind) for kind in MODEL_PICTURES]
+    artist = store.reference_path(rows[-1].surface_hash).exists()
+    failed: list[str] = []
+    faults: list[str] = []
 
-    def files_of(row: ResultRow) -> list[str]:
-        return [map_file(row, kind) for kind in (*kinds(row, with_heat=with_heat), VIEWED)]
+    def files_of(row: ResultRow, points: bool) -> list[str]:
+        own = map_kinds(row.method, points=points, with_heat=with_heat)
+        return [map_file(row, kind) for kind in own if row.status == "ok"]
 
-    everything = [
-        *files,
-        model_file(case, VIEWED),
-        *(name for row in rows for name in files_of(row)),
-    ]
     try:
         surface = store.surface(rows[-1])
     except InputError as error:
+        everything = [model_file(case, kind) for kind in model_kinds(points=False, artist=artist)]
+        everything += [name for row in rows for name in files_of(row, points=False)]
         return everything, [f"{case}: no pictures: {error}"]
-    if not isinstance(surface, Mesh):
-        return everything, [f"{case}: a point cloud; only meshes are drawn"]
-    scene = Scene(surface)
-    cameras = render.two_cameras(scene)
-    views = [scene.view(camera, SIZE, SAMPLES) for camera in cameras]
-    for name, view in zip(files, views, strict=True):
-        save(meshed(view), folder / name)
-    _write_script(folder / model_file(case, VIEWED), viewer.shape(surface, cameras[0]))
-    failed: list[str] = []
-    faults: list[str] = []
-    try:
-        artist = store.reference(rows[-1])
-    except InputError as error:
-        artist = None
-        failed += [model_file(case, kind) for kind in ARTIST_PICTURES]
-        faults.append(f"{case}: no picture of the artist's map: {error}")
-    if artist is not None:
-        found = Map(surface, artist)
-        layout = Layout(found).image(normal_colours(scene, views[0].camera))
-        for kind, image in zip(ARTIST_PICTURES, (textured(views[0], found), layout), strict=True):
-            save(image, folder / model_file(case, kind))
+    points = isinstance(surface, PointCloud)
+    subject = (
+        clouds.Portrait(surface, SIZE, SAMPLES, FIELDS)
+        if isinstance(surface, PointCloud)
+        else Portrait(surface)
+    )
+    for kind, content in subject.model().items():
+        save(content, folder / model_file(case, kind))
+    if artist:
+        try:
+            made = subject.map(store.reference(rows[-1]), ("checker-1", "layout"))
+            for kind, content in zip(ARTIST_PICTURES, made.values(), strict=True):
+                save(content, folder / model_file(case, kind))
+        except InputError as error:
+            failed += [model_file(case, kind) for kind in ARTIST_PICTURES]
+            faults.append(f"{case}: no picture of the artist's map: {error}")
     for row in rows:
         if row.status != "ok":
             continue
         try:
             result = store.result(row)
+            kinds = map_kinds(row.method, points=points, with_heat=with_heat)
+            for kind, content in subject.map(result, kinds).items():
+                save(content, folder / map_file(row, kind))
         except InputError as error:
-            failed += files_of(row)
+            failed += files_of(row, points)
             faults.append(f"{case}, {row.method}: no pictures: {error}")
-            continue
-        fault = ""
-        if not isinstance(result, Parameterization) or len(result.corners) != len(surface.faces):
-            fault = "the map is not of this mesh"
-        elif not (found := Map(surface, result)).has_area:
-            fault = "the map has no area"
-        if fault:
-            failed += files_of(row)
-            faults.append(f"{case}, {row.method}: no pictures: {fault}")
-            continue
-        made = dict(map_images(scene, views, found, with_heat=with_heat))
-        if CLOUD_PICTURES[0] in kinds(row, with_heat=with_heat):
-            made |= cloud_images(scene, views[0], found)
-        for kind, image in made.items():
-            save(image, folder / map_file(row, kind))
-        _write_script(folder / map_file(row, VIEWED), _viewed(found))
     return failed, faults
 
 
-def map_images(
-    scene: Scene, views: list[View], found: Map, *, with_heat: bool = True
-) -> Mapping[str, Image]:
-    """The pictures of a map by their kind."""
-    first, second = views
-    layout = Layout(found)
-    images = {
-        "checker-1": textured(first, found),
-        "checker-2": textured(second, found),
-        "layout": layout.image(normal_colours(scene, first.camera)),
-    }
-    if not with_heat:
-        return images
-    angle, area = heat(found.angle, ANGLE_SCALE), heat(found.area, AREA_SCALE)
-    return images | {
-        "angle": first.image(angle[first.face]),
-        "angle-uv": layout.image(angle),
-        "area": first.image(area[first.face]),
-        "area-uv": layout.image(area),
-    }
+class Portrait:
+    """A mesh, ready to be drawn under any map."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self.mesh = mesh
+        self._scene = Scene(mesh)
+        cameras = render.two_cameras(self._scene)
+        self._views = [self._scene.view(camera, SIZE, SAMPLES) for camera in cameras]
+
+    def model(self) -> Mapping[str, Content]:
+        """The files of the mesh itself by their kind."""
+        made: dict[str, Content] = {
+            kind: meshed(view) for kind, view in zip(MODEL_PICTURES, self._views, strict=True)
+        }
+        sky = self._scene.coarse_openness
+        return made | {VIEWED: viewer.shape(self.mesh, self._views[0].camera, sky)}
+
+    def map(self, result: object, kinds: Sequence[str]) -> Mapping[str, Content]:
+        """The files of a map by their kind, those of `kinds`.
+
+        Raises:
+            InputError: the map is not of this mesh, or there is nothing to see.
+        """
+        if not isinstance(result, Parameterization) or len(result.corners) != len(self.mesh.faces):
+            raise InputError("the map is not of this mesh")
+        found = Map(self.mesh, result)
+        if not found.has_area:
+            raise InputError("the map has no area")
+        first, second = self._views
+        layout = Layout(found)
+        colours = normal_colours(self._scene, first.camera)
+
+        makers: dict[str, Callable[[], Content]] = {
+            "checker-1": lambda: textured(first, found),
+            "checker-2": lambda: textured(second, found),
+            "layout": lambda: layout.image(colours),
+            "angle": lambda: first.image(heat(found.angle, ANGLE_SCALE)[first.face]),
+            "angle-uv": lambda: layout.image(heat(found.angle, ANGLE_SCALE)),
+            "area": lambda: first.image(heat(found.area, AREA_SCALE)[first.face]),
+            "area-uv": lambda: layout.image(heat(found.area, AREA_SCALE)),
+            VIEWED: lambda: viewed(found),
+        }
+        made = {kind: makers[kind]() for kind in kinds if kind in makers}
+        if CLOUD_PICTURES[0] in kinds:
+            uv = found.uv - found.uv.min(axis=(0, 1))
+            squares = FIELDS / self._scene.size
+            made |= clouds.images(first, uv, found.spanning, colours, squares)
+        return made
 
 
-def cloud_images(scene: Scene, view: View, found: Map) -> Mapping[str, Image]:
-    """The pictures of a map that are made of points, by their kind."""
-    colours = normal_colours(scene, view.camera)
-    uv = found.uv - found.uv.min(axis=(0, 1))
-    return clouds.images(view, uv, found.spanning, colours, FIELDS / scene.size)
-
-
-def _viewed(found: Map) -> dict[str, object]:
-    """A map as the viewer draws it."""
+def viewed(found: Map) -> viewer.Script:
+    """Facts and arrays of a map, as the viewer draws it."""
     return viewer.uv_map(
         found.mesh,
         found.parameterization,
@@ -430,10 +459,9 @@ def _viewed(found: Map) -> dict[str, object]:
     )
 
 
-def _write_script(path: Path, content: dict[str, object]) -> None:
-    path.write_text(viewer.script(path.name, content), encoding="utf-8")
-
-
-def save(image: npt.NDArray[np.uint8], path: Path) -> None:
-    """Write `image` as WebP, a quarter of a PNG: the same image gives the same bytes."""
-    Images.fromarray(image).save(path, format="WebP", quality=78, method=4)
+def save(content: Content, path: Path) -> None:
+    """Write a script, or a picture as WebP: the same content gives the same bytes."""
+    if isinstance(content, tuple):
+        path.write_text(viewer.script(path.name, *content), encoding="utf-8")
+    else:
+        Images.fromarray(content).save(path, format="WebP", quality=78, method=4)

@@ -87,7 +87,7 @@ def camera(mesh: Mesh, toward: FloatArray, up: FloatArray, margin: float = 1.04)
     right = np.cross(up, back)
     right = right / np.linalg.norm(right)
     axes = np.stack([right, np.cross(back, right), back])
-    seen = mesh.vertices[np.unique(mesh.faces)] @ axes.T
+    seen = mesh.vertices[mesh.referenced] @ axes.T
     low, high = seen.min(axis=0), seen.max(axis=0)
     half = np.maximum((high - low)[:2] / 2, (high - low).max() / 8) * margin
     return Camera(axes=axes, centre=(low + high) / 2 @ axes, half=half)
@@ -163,8 +163,9 @@ class Scene:
     """
 
     def __init__(self, mesh: Mesh, *, shadows: bool = True) -> None:
-        """A scene of `mesh`; without `shadows` for pictures that are not lit."""
+        """A scene of `mesh`; without `shadows` nothing keeps the sky from any of it."""
         self.mesh = mesh
+        self._shadows = shadows
         self.fine = split(mesh, FINE_FACES if shadows else 0)
         self.rays = Rays(self.fine.mesh)
         low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
@@ -184,11 +185,13 @@ class Scene:
 
     @cached_property
     def openness(self) -> Floats:
-        """(fine faces, 3, 2) how much of the sky a corner sees on its front and back: 1 for all.
+        """(fine vertices, 2) how much of the sky each sees on its front and back: 1 for all.
 
         Cosine-weighted, over directions that are the same for every vertex: smooth, no noise.
         """
         mesh = self.fine.mesh
+        if not self._shadows:
+            return np.ones((len(mesh.vertices), 2), dtype=np.float32)
         normals = _unit(np.asarray(igl.per_vertex_normals(mesh.vertices, mesh.faces)))
         count = int(np.clip(OCCLUSION_RAYS // len(normals), 32, 128))
         directions = sphere_directions(count)
@@ -205,16 +208,12 @@ class Scene:
             total = np.bincount(at, weight, len(normals))
             free = np.bincount(at[~blocked], weight[~blocked], len(normals))
             share[:, side] = free / np.where(total > 0, total, 1)
-        return share[mesh.faces]
+        return share
 
     @property
     def coarse_openness(self) -> Floats:
-        """(F, 3) the front's `openness` at the corners of the faces of the mesh itself."""
-        share = np.ones(len(self.mesh.vertices), dtype=np.float32)
-        fine = self.fine.mesh.faces.reshape(-1)
-        own = fine < len(share)  # splitting keeps the vertices of the mesh first
-        share[fine[own]] = self.openness[..., 0].reshape(-1)[own]
-        return share[self.mesh.faces]
+        """(V, 2) how much of the sky the vertices of the mesh itself see."""
+        return self.openness[: len(self.mesh.vertices)]  # splitting keeps these first
 
     def view(self, camera: Camera, size: int, samples: int = 3) -> View:
         """What `camera` sees in an image whose longer side has `size` pixels.
@@ -329,7 +328,7 @@ class View:
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.float32(1e-6))
         front = self.scene.face_normals[self.face] @ self.camera.axes[2] >= 0
         normal[~front] *= -1
-        openness = self.scene.openness[self.fine_face]
+        openness = self.scene.openness[self.scene.fine.mesh.faces[self.fine_face]]
         side = np.where(front[:, None], openness[..., 0], openness[..., 1])
         sky = np.einsum("sk,sk->s", self._corner_weights, side)
         facing = np.maximum(normal @ KEY_LIGHT, 0), np.maximum(normal @ FILL_LIGHT, 0)

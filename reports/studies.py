@@ -12,14 +12,26 @@ import numpy.typing as npt
 from scipy import stats
 
 from parapoint.preparation import CUT
-from reports.contents import ANGLE, AREA, FLIPPED, SPANNING, Contents, Label, number
+from reports.contents import (
+    ANGLE,
+    AREA,
+    FLIPPED,
+    ISOMETRIC,
+    POINT_ANGLE,
+    POINT_AREA,
+    POINT_COLLISIONS,
+    POINT_TEARS,
+    SPANNING,
+    Contents,
+    Label,
+    number,
+)
 from reports.notes import environment_note, failure_notes, legend, method_notes
 from reports.published import model
 from reports.table import Column, Table, Value, metric_column
 
 Floats = npt.NDArray[np.float64]
 
-ISOMETRIC = "symmetric_dirichlet"
 OVERLAPPED, BIJECTIVE = "overlapped_fraction", "bijective"
 
 CONFIDENCE = 0.95
@@ -40,54 +52,100 @@ def kind(contents: Contents, case: str) -> str:
     return known.get(topology, topology)
 
 
-def success(contents: Contents) -> Table:
-    """Methods × kinds of surface: how often each ends well, and means over the common models."""
-    kinds: dict[str, list[str]] = {}
+def kinds(contents: Contents) -> dict[str, list[str]]:
+    """The models by the kind of surface."""
+    found: dict[str, list[str]] = {}
     for case in contents.cases:
-        kinds.setdefault(kind(contents, case), []).append(case)
-    records = contents.records
-    rows: dict[str, dict[str, Value]] = {
-        label.short: {"method": label.short, "label": label.short} for label in contents.methods
-    }
+        found.setdefault(kind(contents, case), []).append(case)
+    return found
+
+
+def success(contents: Contents) -> Table:
+    """Methods × kinds of surface: how often each ends well, and with a map that is one to one."""
+    groups = {"all": contents.cases} | kinds(contents)
+    if len(groups) == 2:  # one kind, which is all
+        del groups["all"]
+    rows = []
+    for label in contents.methods:
+        row: dict[str, Value] = {"method": label.short, "label": label.short}
+        for name, cases in groups.items():
+            records = [contents.records.get((case, label.short)) for case in cases]
+            own = [record for record in records if record is not None]
+            row[f"{name} ok"] = _share(sum(record["ok"] > 0 for record in own), len(own))
+            bijective = sum(number(record, BIJECTIVE) == 1 for record in own)
+            row[f"{name} {BIJECTIVE}"] = _share(bijective, len(own))
+        rows.append(row)
     columns = [Column("method", "Method", text=True)]
-    for name, cases in kinds.items():
-        common = common_cases(contents, cases)
-        title = f"{name}: {len(cases)}"
-        columns.append(Column(f"{name} ok", "ok", text=True, group=title))
-        for metric, short in ((ANGLE, "angle"), (AREA, "area"), (ISOMETRIC, "sym. Dirichlet")):
-            digits = 2 if metric == ISOMETRIC else 3
-            columns.append(
-                Column(f"{name} {metric}", short, better="lower", digits=digits, group=title)
-            )
-        for label in contents.methods:
-            own = [records[case, label.short] for case in cases if (case, label.short) in records]
-            good = sum(record["ok"] > 0 for record in own)
-            row = rows[label.short]
-            row[f"{name} ok"] = f"{good}/{len(own)}" if own else "not run"
-            for metric in (ANGLE, AREA, ISOMETRIC):
-                values = [number(records.get((case, label.short)), metric) for case in common]
-                known = [value for value in values if value is not None]
-                if known and len(known) == len(common):
-                    row[f"{name} {metric}"] = float(np.mean(known))
-    common_counts = [f"{name} {len(common_cases(contents, kinds[name]))}" for name in kinds]
+    for name, cases in groups.items():
+        columns.append(Column(f"{name} ok", "ok", text=True, group=f"{name}: {len(cases)}"))
+        if not contents.clouds.issuperset(cases):
+            one = Column(f"{name} {BIJECTIVE}", "1 to 1", text=True, group=f"{name}: {len(cases)}")
+            columns.append(one)
     return Table(
         name="success",
-        title="Success and means by kind of surface",
+        title="Success by kind of surface",
         caption=(
-            "By kind of surface (number of models): models on which the method ended well with at "
-            "least one seed, of those it was asked for, skipped ones included; and the means over "
-            "the models on which every method that ever ends well on this kind did, so that nobody "
-            f"gains by failing ({'; '.join(common_counts)})."
+            "By kind of surface (number of models): on how many models the method ended well with "
+            "at least one seed, and on how many of them its maps are one to one (no face flipped, "
+            "degenerate or over another); of those it was asked for, skipped ones included."
         ),
         columns=tuple(columns),
-        blocks=(tuple(rows.values()),),
-        set_apart=contents.atlases,
-        notes=(
-            legend(contents),
-            *method_notes(contents),
-            *failure_notes(contents),
-            environment_note(contents),
+        blocks=(tuple(rows),),
+        notes=(legend(contents), *failure_notes(contents), environment_note(contents)),
+    )
+
+
+def _share(count: int, of: int) -> str:
+    return f"{count}/{of}" if of else "not run"
+
+
+KIND_METRICS = (
+    *(ANGLE, AREA, ISOMETRIC, FLIPPED, OVERLAPPED),
+    *(POINT_ANGLE, POINT_AREA, POINT_COLLISIONS, POINT_TEARS),
+    "seconds",
+)
+"""The metrics that are told kind by kind."""
+
+
+def means_by_kind(contents: Contents) -> Table:
+    """Kinds of surface × methods: means over the models that all methods can do."""
+    names = [name for name in KIND_METRICS if contents.means[name].notna().any()]
+    blocks = []
+    for name, cases in kinds(contents).items():
+        common = common_cases(contents, cases)
+        block = []
+        for label in contents.methods:
+            found = {case: contents.records.get((case, label.short)) for case in cases}
+            own = [record for record in found.values() if record is not None]
+            row: dict[str, Value] = {
+                "kind": f"{name}: means over {len(common)} of {len(cases)}",
+                "method": label.short,
+                "label": label.short,
+                "done": _share(sum(record["ok"] > 0 for record in own), len(own)),
+            }
+            for metric in names:
+                values = [number(found[case], metric) for case in common]
+                known = [value for value in values if value is not None]
+                if known and len(known) == len(common):
+                    row[metric] = float(np.mean(known))
+            block.append(row)
+        blocks.append(tuple(block))
+    return Table(
+        name="kinds",
+        title="Means by kind of surface",
+        caption=(
+            "Means over the models of a kind on which every method that ever ends well on this "
+            "kind did, so that nobody gains by failing; ok: on how many the method ended well."
         ),
+        columns=(
+            Column("kind", "Surface", text=True, once=True),
+            Column("method", "Method", text=True),
+            *(metric_column(name, _SHORT.get(name, "")) for name in names),
+            Column("done", "ok", text=True),
+        ),
+        blocks=tuple(blocks),
+        set_apart=contents.atlases,
+        notes=(legend(contents), *method_notes(contents), environment_note(contents)),
     )
 
 
@@ -132,6 +190,10 @@ _SHORT = {
     FLIPPED: "flipped %",
     OVERLAPPED: "overlapped %",
     SPANNING: "spanning %",
+    POINT_ANGLE: "stretch",
+    POINT_AREA: "area",
+    POINT_COLLISIONS: "collisions %",
+    POINT_TEARS: "tears %",
     "seam_excess": "seam − artist's",
 }
 

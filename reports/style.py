@@ -60,8 +60,9 @@ def look(contents: Contents, label: Label) -> dict[str, Any]:
         at = ours.index(label) % len(DASHES)
         return {"color": OURS, "linestyle": DASHES[at], "marker": MARKERS[-1 - at]}
     others = [other for other in contents.methods if other.method != "parapoint"]
-    at = others.index(label) % len(COLOURS)
-    return {"color": COLOURS[at], "linestyle": DASHES[at], "marker": MARKERS[at]}
+    turn, at = divmod(others.index(label), len(COLOURS))
+    other = (at + turn) % len(COLOURS)  # a colour that comes again has other marks
+    return {"color": COLOURS[at], "linestyle": DASHES[other], "marker": MARKERS[other]}
 
 
 def figure(width: float, height: float) -> Figure:
@@ -77,7 +78,7 @@ def put(place: Axes, path: Path) -> None:
     try:
         with Images.open(path) as image:
             box = place.get_window_extent()
-            scale = STYLE["savefig.dpi"] / mpl.rcParams["figure.dpi"]
+            scale = mpl.rcParams["savefig.dpi"] / mpl.rcParams["figure.dpi"]
             shown = image.convert("RGBA")
             shown.thumbnail((round(box.width * scale), round(box.height * scale)))
             white = Images.new("RGBA", shown.size, "white")
@@ -163,7 +164,7 @@ def wrapped(name: str, width: int = 20) -> str:
 
 
 def small_multiples(
-    count: int, height: float = 2.1, *, left: float = 0.08, bottom: float = 0.82
+    count: int, height: float = 2.1, *, left: float = 0.08, bottom: float = 1.0
 ) -> tuple[Figure, list[Axes]]:
     """A figure of `count` like panels, three in a row, with room for a legend below."""
     across = min(3, count)
@@ -183,8 +184,10 @@ def small_multiples(
 
 
 def plain_log(axis: Axis) -> None:
-    """Ticks at 1, 2 and 5 of each decade, as plain numbers."""
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=7))
+    """Ticks at 1, 2 and 5 of each decade, or at 1 alone where there are many, as plain numbers."""
+    low, high = axis.get_view_interval()
+    subs = (1.0, 2.0, 5.0) if high < 100 * low else (1.0,)
+    axis.set_major_locator(LogLocator(subs=subs, numticks=7))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,g}"))
     axis.set_minor_formatter(NullFormatter())
 

@@ -5,10 +5,28 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from parapoint.preparation import CUT
-from reports.contents import ANGLE, AREA, FLIPPED, SPANNING, Contents, number
+from reports.contents import (
+    ANGLE,
+    AREA,
+    FLIPPED,
+    POINT_ANGLE,
+    POINT_AREA,
+    POINT_COLLISIONS,
+    POINT_TEARS,
+    SPANNING,
+    Contents,
+    number,
+)
 from reports.notes import environment_note, failure_notes, legend, method_notes
 from reports.published import AUTHORS, Verdict, claim_text, published_values, verdicts
-from reports.studies import ablation, cuts, paired_tests, seed_variance, success
+from reports.studies import (
+    ablation,
+    cuts,
+    means_by_kind,
+    paired_tests,
+    seed_variance,
+    success,
+)
 from reports.table import Column, Table, Value, metric_column, metric_title
 
 SUMMARY_METRICS = (
@@ -23,13 +41,22 @@ SUMMARY_METRICS = (
     "overlapped_fraction",
     SPANNING,
     "seam_length",
+    POINT_ANGLE,
+    POINT_AREA,
+    POINT_COLLISIONS,
+    POINT_TEARS,
     "seconds",
 )
 """The metrics of the printed comparison; its CSV has them all."""
 
 
-def conformality(contents: Contents) -> Table:
-    """The supplement's table: models × methods, published figures in columns of their own."""
+def conformality(contents: Contents) -> Table | None:
+    """The supplement's table: models × methods, published figures in columns of their own.
+
+    None where all models are clouds, which have no triangles.
+    """
+    if contents.clouds.issuperset(contents.cases):
+        return None
     columns = [Column("case", "Model", text=True)]
     columns += [
         Column(label.short, label.short, better="lower", digits=4, group="Measured here")
@@ -90,8 +117,11 @@ def _published_notes(authors: Sequence[str]) -> list[str]:
     ]
 
 
-def supplement(contents: Contents) -> Table:
-    """Each model's methods with angle distortion, area distortion, flips and spanning faces."""
+def supplement(contents: Contents) -> Table | None:
+    """Each mesh's methods with angle distortion, area distortion, flips and spanning faces."""
+    meshes = [case for case in contents.cases if case not in contents.clouds]
+    if not meshes:
+        return None
     judged: dict[tuple[str, str], Verdict] = {
         (verdict.case, verdict.label.short): verdict for verdict in verdicts(contents)
     }
@@ -123,7 +153,7 @@ def supplement(contents: Contents) -> Table:
     if authors:
         columns.append(Column("verdict", "Against published", text=True))
     blocks = []
-    for case in contents.cases:
+    for case in meshes:
         rows: list[dict[str, Value]] = []
         for label in contents.methods:
             record = contents.records.get((case, label.short))
@@ -353,11 +383,12 @@ def tables(contents: Contents) -> list[Table]:
     """The tables of a suite, the one to read first first."""
     made = [
         ablation(contents),
+        success(contents),
+        means_by_kind(contents),
         conformality(contents),
         against_published(contents),
         supplement(contents),
         comparison(contents),
-        success(contents),
         cuts(contents),
         paired_tests(contents),
         seed_variance(contents),

@@ -176,7 +176,7 @@
 
   function entry({ text, title, mark, link, small, words, value }) {
     const made = element("td", { className: `${words ? "text" : ""} ${mark ?? ""}`.trim(), title: title ?? "" });
-    made.dataset.value = words ? text : value ?? "";
+    if (!words) made.dataset.value = value ?? "";
     made.append(link ? element("a", { href: link, textContent: text }) : text);
     if (small) made.append(element("small", { textContent: small }));
     return made;
@@ -208,10 +208,10 @@
     cell.setAttribute("aria-sort", way === 1 ? "ascending" : "descending");
     const text = cell.classList.contains("text");
     const value = (row) => {
-      const raw = row.cells[cell.cellIndex].dataset.value;
-      if (text) return raw.toLowerCase();
-      const infinite = { inf: Infinity, "-inf": -Infinity };
-      return raw in infinite ? infinite[raw] : raw === "" ? NaN : Number(raw);
+      const { dataset, textContent } = row.cells[cell.cellIndex];
+      if (text) return textContent.toLowerCase();
+      const value = number(dataset.value);
+      return value === undefined || value === "" ? NaN : Number(value);
     };
     const compare = (one, two) => {
       const [a, b] = [value(one), value(two)];

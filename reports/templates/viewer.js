@@ -20,35 +20,94 @@
     });
   }
 
+  // The object of `script` of viewer.py, its arrays in place of their description.
   async function file(address) {
     await script(address);
     const name = address.slice(address.lastIndexOf("/") + 1);
-    const content = window.received[name];
+    const { data, arrays, ...given } = window.received[name];
     delete window.received[name];
-    return content;
+    const stream = new Blob([eights(data)]).stream().pipeThrough(new DecompressionStream("deflate"));
+    const planes = new Uint8Array(await new Response(stream).arrayBuffer());
+    let start = 0;
+    for (const [key, [bytes, rows, columns]] of Object.entries(arrays)) {
+      const values = new { 1: Uint8Array, 2: Uint16Array, 4: Uint32Array }[bytes](rows * columns);
+      for (let at = 0; at < bytes; at++)
+        for (let column = 0; column < columns; column++)
+          for (let row = 0; row < rows; row++) values[row * columns + column] += planes[start++] * 2 ** (8 * at);
+      given[key] = Object.assign(values, { columns });
+    }
+    return given;
   }
 
-  // Undoes `packed` of viewer.py: rows × columns of unsigned integers.
-  async function unpacked({ bytes, rows, columns, data }) {
-    const content = Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0));
-    const stream = new Blob([content]).stream().pipeThrough(new DecompressionStream("deflate"));
-    const planes = new Uint8Array(await new Response(stream).arrayBuffer());
-    const values = new { 1: Uint8Array, 2: Uint16Array, 4: Uint32Array }[bytes](rows * columns);
-    const size = rows * columns;
-    for (let column = 0; column < columns; column++) {
-      let value = 0;
-      for (let row = 0; row < rows; row++) {
-        for (let at = 0; at < bytes; at++) value += planes[at * size + column * rows + row] * 2 ** (8 * at);
-        values[row * columns + column] = value;
-        value = values[row * columns + column];
-      }
+  // The bytes whose bits stand in a text by sevens.
+  function eights(text) {
+    const bytes = new Uint8Array(Math.floor((text.length * 7) / 8));
+    let held = 0, bits = 0, at = 0;
+    for (let place = 0; place < text.length; place++) {
+      held = (held << 7) | text.charCodeAt(place);
+      bits += 7;
+      if (bits < 8) continue;
+      bits -= 8;
+      bytes[at++] = held >> bits;
+      held &= (1 << bits) - 1;
     }
+    return bytes;
+  }
+
+  // Undoes `steps`: sums down the rows, which wrap around.
+  function summed(values) {
+    for (let at = values.columns; at < values.length; at++) values[at] += values[at - values.columns];
     return values;
   }
 
-  async function points({ low, side, steps }) {
-    const values = await unpacked(steps);
-    return Float32Array.from(values, (step, at) => low[at % low.length] + (step / 65535) * side);
+  // The faces whose corners are given as how far they are below the highest before; 0 is a new one.
+  function counted(below) {
+    let next = 0;
+    return below.map((step) => (step ? next - step : next++));
+  }
+
+  // Undoes `surprises`: calls `each` of a row and of the three that its parallelogram is made of.
+  function grow(corners, each) {
+    const base = corners.reduce((most, row) => Math.max(most, row), 0) + 1;
+    const opposite = new Map(), seen = new Uint8Array(base);
+    const edge = (one, two) => Math.min(one, two) * base + Math.max(one, two);
+    let before = -1;
+    for (let face = 0; face < corners.length; face += 3) {
+      for (let k = 0; k < 3; k++) {
+        const row = corners[face + k];
+        if (seen[row]) continue;
+        seen[row] = 1;
+        const [one, two] = [corners[face + ((k + 1) % 3)], corners[face + ((k + 2) % 3)]];
+        const three = opposite.get(edge(one, two));
+        if (three === undefined) each(row, before, before, before);
+        else each(row, one, two, three);
+        before = row;
+      }
+      for (let k = 0; k < 3; k++) {
+        const key = edge(corners[face + k], corners[face + ((k + 1) % 3)]);
+        if (!opposite.has(key)) opposite.set(key, corners[face + ((k + 2) % 3)]);
+      }
+    }
+  }
+
+  // The places (rows, columns) of the rows that `corners` name, in whole steps.
+  function places(surprises, corners, bits) {
+    const { columns } = surprises, mask = 2 ** bits - 1;
+    const found = new Int32Array(columns * (corners.reduce((most, row) => Math.max(most, row), 0) + 1));
+    let at = 0;
+    grow(corners, (row, one, two, three) => {
+      for (let k = 0; k < columns; k++, at++) {
+        const value = (of) => (of < 0 ? 0 : found[of * columns + k]);
+        const wrong = surprises[at] & 1 ? -((surprises[at] + 1) >> 1) : surprises[at] >> 1;
+        found[row * columns + k] = (value(one) + value(two) - value(three) + wrong) & mask;
+      }
+    });
+    return found;
+  }
+
+  function points(surprises, corners, { low, side, bits }) {
+    const steps = places(surprises, corners, bits);
+    return Float32Array.from(steps, (step, at) => low[at % low.length] + (step / (2 ** bits - 1)) * side);
   }
 
   // --- geometry ---
@@ -102,12 +161,12 @@
 
   const FACES = [
     `#version 300 es
-    in vec3 position; in vec3 normal; in vec2 uv; in vec3 heat;
+    in vec3 position; in vec3 normal; in vec2 uv; in vec3 heat; in vec2 sky;
     uniform mat3 axes; uniform vec3 centre; uniform vec2 scale; uniform vec2 shift; uniform float depth;
     uniform bool plane;
-    out vec3 seen; out vec3 own; out vec2 at; flat out vec3 about; flat out int face;
+    out vec3 seen; out vec3 own; out vec2 at; out vec2 open; flat out vec3 about; flat out int face;
     void main() {
-      face = gl_VertexID / 3; at = uv; about = heat; own = axes * normal;
+      face = gl_VertexID / 3; at = uv; about = heat; open = sky; own = axes * normal;
       // In the plane, faces that span a seam lie below the others and flipped ones above.
       float height = heat.z == 1.0 ? -0.5 : heat.z >= 2.0 ? 0.5 : 0.0;
       seen = plane ? vec3(uv, height) : axes * (position - centre);
@@ -115,7 +174,7 @@
     }`,
     `#version 300 es
     precision highp float; precision highp int;
-    in vec3 seen; in vec3 own; in vec2 at; flat in vec3 about; flat in int face;
+    in vec3 seen; in vec3 own; in vec2 at; in vec2 open; flat in vec3 about; flat in int face;
     uniform int mode; uniform bool plane; uniform bool picking; uniform int chosen; uniform float fields;
     uniform sampler2D scales;
     out vec4 colour;
@@ -138,7 +197,7 @@
       if (picking) { int f = face + 1; colour = vec4(f & 255, (f >> 8) & 255, (f >> 16) & 255, 255) / 255.0; return; }
       float tone = board(at * fields);
       bool spans = about.z == 1.0, flips = about.z >= 2.0;
-      vec3 normals = linear(0.5 + 0.42 * normalize(own));
+      vec3 normals = linear((0.5 + 0.42 * normalize(own)) * (0.30 + 0.70 * open.x));
       vec3 c = mode == 2 ? heat(about.x, 0.25) : mode == 3 ? heat(about.y, 0.75)
         : mode == 4 ? (plane ? PALE : CLAY) : mode == 1 ? normals
         : plane ? normals * (0.72 + 0.38 * tone) : mix(DARK, LIGHT, tone);
@@ -151,8 +210,10 @@
         bool front = gl_FrontFacing;
         if (!front) n = -n;
         float key = max(dot(n, normalize(vec3(-0.42, 0.56, 0.71))), 0.0), fill = max(dot(n, vec3(0.80, 0.10, 0.59)), 0.0);
-        float light = 0.50 * (0.75 + 0.25 * n.y) + 0.62 * key + 0.12 * fill;
-        if (mode != 1) c = c * (front ? light : 0.72 * light) + 0.05 * pow(max(dot(n, normalize(vec3(-0.42, 0.56, 1.71))), 0.0), 40.0);
+        float sky = front ? open.x : open.y;
+        float light = 0.50 * sky * (0.75 + 0.25 * n.y) + 0.62 * key * (0.25 + 0.75 * sky) + 0.12 * fill * sky;
+        float gloss = 0.05 * pow(max(dot(n, normalize(vec3(-0.42, 0.56, 1.71))), 0.0), 40.0) * sky;
+        if (mode != 1) c = c * (front ? light : 0.72 * light) + gloss;
       }
       if (face == chosen) c = vec3(1.0, 0.85, 0.0);
       colour = vec4(srgb(clamp(c, 0.0, 1.0)), 1.0);
@@ -247,10 +308,12 @@
   async function readShape() {
     const given = await file(facts.shape);
     if (given.large) throw new Error(`${given.large.toLocaleString()} faces are too many for the viewer: pictures only.`);
-    const [vertices, faces, order] = await Promise.all([points(given.vertices), unpacked(given.faces), unpacked(given.order)]);
+    const faces = counted(given.faces), order = summed(given.order);
+    const vertices = points(given.vertices, faces, given.box);
     const positions = gathered(vertices, 3, faces);
     shape = {
       vertices, faces, order, positions, normals: cornerNormals(positions, faces, vertices.length / 3),
+      sky: gathered(places(given.sky, faces, facts.sky), 2, faces).map((step) => step / (2 ** facts.sky - 1)),
       centre: given.centre, half: given.half, size: given.size, axes: given.axes.flat(),
     };
     state.axes = shape.axes;
@@ -458,11 +521,11 @@
     }
     async read() {
       const given = await file(this.element.dataset.map);
-      const [rows, moved, border, seams, angle, area, kind] = await Promise.all([
-        points(given.uv), ...[given.moved, given.border, given.seams, given.angle, given.area, given.state].map(unpacked),
-      ]);
+      const [moved, border, seams, angle, area] = ["moved", "border", "seams", "angle", "area"].map((key) => summed(given[key]));
+      const kind = given.state;
       const corners = shape.faces.slice();
       for (let at = 0; at < moved.length; at += 2) corners[moved[at]] = moved[at + 1];
+      const rows = points(given.uv, corners, given.box);
       const vertexOf = new Uint32Array(rows.length / 2).map((_, row) => row);
       for (let at = 0; at < moved.length; at += 2) vertexOf[moved[at + 1]] = shape.faces[moved[at]];
       Object.assign(this, { uv: gathered(rows, 2, corners), angle, area, kind });
@@ -484,6 +547,7 @@
       attribute(paint, "normal", shape.normals, 3);
       attribute(paint, "uv", this.uv, 2);
       attribute(paint, "heat", heat, 3);
+      attribute(paint, "sky", shape.sky, 2);
       this.border = lines(rows, 2, border);
       this.cut = lines(rows, 2, seams);
       this.seams = lines(shape.vertices, 3, seams.map((row) => vertexOf[row]));

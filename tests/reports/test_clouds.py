@@ -1,6 +1,9 @@
 import numpy as np
+import pytest
 
-from parapoint.surface import Mesh
+from parapoint.errors import InputError
+from parapoint.parameterization import PointParameterization
+from parapoint.surface import Mesh, PointCloud
 from reports import clouds, render
 from reports.clouds import surface_points
 from reports.pictures import FIELDS, Map, normal_colours
@@ -59,3 +62,39 @@ def test_points_on_faces_that_span_the_seam_are_green():
     turned = ball().vertices[:, [1, 2, 0]] * [1, 1, -1]  # the date line faces the camera
     mesh = Mesh(turned, ball().faces)
     assert greens(mesh, lonlat(ball())) > 0
+
+
+def waves(count=400):
+    """Points on a wavy sheet, and their map to the plane."""
+    points = surface_points(sheet(), count).positions
+    return PointCloud(points), PointParameterization(points[:, :2])
+
+
+def greens(image):
+    red, green, blue, shown = np.moveaxis(image.astype(int), 2, 0)
+    return int(((green > red + 60) & (green > blue + 60) & (shown > 0)).sum())
+
+
+def test_a_cloud_is_seen_with_its_normals_or_without():
+    cloud, result = waves()
+    normals = np.tile([0.0, 0, 1], (400, 1))
+    for one in (cloud, PointCloud(cloud.points, normals)):
+        made = clouds.Portrait(one, 64, 2, FIELDS).map(result, ("cloud-uv", "dense", "seams"))
+        assert list(made) == ["cloud-uv", "dense", "seams"]
+        covered = {kind: int((image[..., 3] > 0).sum()) for kind, image in made.items()}
+        assert 0.2 * covered["dense"] < covered["seams"] < 0.95 * covered["dense"]
+        shades = made["dense"][made["dense"][..., 3] == 255][:, :3].astype(int)
+        blue = shades[:, 2] > shades[:, 0] + 40  # of the two tones of the board, both are there
+        assert 0.2 < blue.mean() < 0.8
+        assert greens(made["seams"]) == 0
+
+
+def test_where_a_map_of_a_cloud_tears_is_green():
+    cloud, result = waves()
+    portrait = clouds.Portrait(cloud, 64, 2, FIELDS)
+    torn = result.uv + [[1.0, 0]] * (cloud.points[:, :1] > 0.5)
+    assert greens(portrait.map(PointParameterization(torn), ("seams",))["seams"]) > 20
+    with pytest.raises(InputError, match="7 uv rows"):
+        portrait.map(PointParameterization(result.uv[:7]), ("seams",))
+    with pytest.raises(InputError, match="not one of points"):
+        portrait.map(flat(sheet()), ("seams",))

@@ -41,7 +41,7 @@ def test_figures_are_drawn_again_only_when_something_changed(suite, tmp_path, mo
     monkeypatch.setattr(figures, "drawings", lambda *_: kept)
     written = []
     monkeypatch.setattr(
-        figures, "write", lambda folder, one: (written.append(one.name), write(folder, one))
+        figures, "write", lambda *given: (written.append(given[-1].name), write(*given))
     )
     draw(suite, tmp_path, tmp_path, 1)
     draw(suite, tmp_path, tmp_path, 1)
@@ -55,7 +55,7 @@ def test_the_same_results_give_the_same_bytes(suite, tmp_path):
     made = next(one for one in drawings(suite, tmp_path) if one.name == "pareto")
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
-        write(tmp_path / name, made)
+        write(tmp_path / name, False, made)
     for kind in ("pdf", "png"):
         one, two = ((tmp_path / name / f"pareto.{kind}").read_bytes() for name in ("one", "two"))
         assert one == two

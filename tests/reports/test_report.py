@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from parapoint import console
-from parapoint.parameterization import Parameterization
+from parapoint.parameterization import Parameterization, PointParameterization
+from parapoint.surface import PointCloud
 from reports.__main__ import main
 from reports.contents import contents
 from reports.report import write
@@ -100,7 +101,7 @@ def test_an_unchanged_report_is_the_same_to_the_byte(reported):
 def test_every_table_is_there_in_four_formats(reported):
     folder = reported / "report" / "tables" / "paper"
     names = {"conformality", "supplement", "comparison", "published", "failures", "cells"}
-    names |= {"success", "cuts"}
+    names |= {"success", "kinds", "cuts"}
     assert {path.stem for path in folder.iterdir()} == names
     kinds = (".tex", ".md", ".csv", ".html")
     assert all((folder / f"{name}{kind}").exists() for name in names for kind in kinds)
@@ -152,6 +153,28 @@ def test_maps_that_do_not_fit_or_have_no_area_are_told_and_the_rest_is_reported(
     text = parsed(write(tmp_path, jobs=1)).text
     assert text.count("the map is not of this mesh") == 2
     assert text.count("the map has no area") == 1
+
+
+def test_a_cloud_has_pictures_and_metrics_of_points(tmp_path):
+    points = sheet().vertices
+    cloud, result = PointCloud(points), PointParameterization(points[:, :2])
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        writer.cell("scan", cloud, "meshed", {"flattening": "lscm"}, result=result)
+        writer.cell("scan", cloud, "parapoint", {}, result=result)
+    index = write(tmp_path, jobs=1)
+    text = parsed(index).text
+    assert "Angles at points" in text
+    assert "Conformality" not in text  # it has no triangles
+    page = parsed(index.parent / "models/paper/scan.html")
+    assert all((index.parent / "models/paper" / a.split("#")[0]).exists() for a in page.addresses)
+    assert "a cloud has pictures alone" in page.text
+    tears = page.text.count("where the map tears") - page.text.count("points where the map tears")
+    assert tears == 2  # a picture of each map, beside the metric
+    assert "local σ1/σ2" in page.text
+    drawn = index.parent / "figures" / "paper"
+    assert {"clouds.png", "maps-scan.pdf"} <= {path.name for path in drawn.iterdir()}
+    assert "disks.png" not in {path.name for path in drawn.iterdir()}
 
 
 def test_a_user_s_file_and_two_suites(tmp_path):

@@ -10,6 +10,7 @@ from reports.studies import (
     cuts,
     half_width,
     holm,
+    means_by_kind,
     pair,
     paired_tests,
     seed_variance,
@@ -59,9 +60,16 @@ def test_success_counts_skips_and_compares_on_common_models(results):
     assert rows["SLIM symmetric Dirichlet"]["disk ok"] == "2/2"
     assert rows["SLIM symmetric Dirichlet"]["closed, genus 0 ok"] == "0/1"
     assert rows["ParaPoint"]["closed, genus 0 ok"] == "1/1"
+    assert rows["ParaPoint"]["all ok"] == "3/3"
+    assert rows["ParaPoint"]["disk bijective"] == "2/2"
+    assert rows["ParaPoint"]["closed, genus 0 bijective"] == "0/1"  # it spans its seam
     values = suite.means.set_index(["label", "case"])["angle_difference_mean"]["ParaPoint"]
-    common = rows["ParaPoint"]["disk angle_difference_mean"]
+    disks, closed = ({row["label"]: row for row in block} for block in means_by_kind(suite).blocks)
+    common = disks["ParaPoint"]["angle_difference_mean"]
     assert common == pytest.approx(values[[HAND, DEVIL]].mean())
+    assert disks["ParaPoint"]["kind"] == "disk: means over 2 of 2"
+    assert closed["ParaPoint"]["angle_difference_mean"] == pytest.approx(values[NEFERTITI])
+    assert closed["SLIM symmetric Dirichlet"].get("angle_difference_mean") is None
 
 
 def test_cuts_say_who_cut_and_whether_the_map_is_one(results):

@@ -1,4 +1,3 @@
-import base64
 import json
 import zlib
 
@@ -6,60 +5,164 @@ import numpy as np
 import pytest
 
 from parapoint.parameterization import Parameterization
+from parapoint.surface import Mesh
 from reports import render, viewer
 from reports.pictures import Map
 
 from .conftest import ball, flat, sheet
 
 
-def unpacked(given):
-    """What the viewer makes of `packed`, read from its description: planes of bytes of steps."""
-    content = np.frombuffer(zlib.decompress(base64.b64decode(given["data"])), np.uint8)
-    planes = content.reshape(given["bytes"], given["columns"], given["rows"]).astype(np.uint64)
-    steps = sum(plane << np.uint64(8 * at) for at, plane in enumerate(planes))
-    size = np.uint64(2 ** (8 * given["bytes"]))
-    return (np.cumsum(steps, axis=1, dtype=np.uint64) % size).T
+def eights(text):
+    """The bytes whose bits a text holds by sevens."""
+    bits = "".join(f"{ord(letter):07b}" for letter in text)
+    return bytes(int(bits[at : at + 8], 2) for at in range(0, len(bits) - 7, 8))
+
+
+def read(text):
+    """Name and object of a script, its arrays as its description says: planes of bytes."""
+    name, content = text.removeprefix("received[").rstrip(";\n").split("]=", 1)
+    given = json.loads(content, strict=False)  # with letters that JSON would have escaped
+    planes = np.frombuffer(zlib.decompress(eights(given.pop("data"))), np.uint8)
+    for key, (size, rows, columns) in given.pop("arrays").items():
+        own, planes = np.split(planes, [size * rows * columns])
+        items = own.reshape(size, columns, rows).astype(np.uint64)
+        given[key] = sum(plane << np.uint64(8 * at) for at, plane in enumerate(items)).T.astype(int)
+    assert len(planes) == 0
+    return json.loads(name), given
 
 
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16, np.uint32])
-def test_packed_integers_come_back(kind):
-    values = np.random.default_rng(0).integers(0, np.iinfo(kind).max, (50, 3), kind, endpoint=True)
-    np.testing.assert_array_equal(unpacked(viewer.packed(values)), values)
-    assert unpacked(viewer.packed(values[:0])).shape == (0, 3)
-    np.testing.assert_array_equal(unpacked(viewer.packed(values[:, 0]))[:, 0], values[:, 0])
+def test_a_script_holds_facts_and_arrays(kind):
+    draw = np.random.default_rng(0)
+    values = draw.integers(0, np.iinfo(kind).max, (500, 3), kind, endpoint=True)
+    text = viewer.script(
+        "a.js", {"x": 1}, {"some": values, "none": values[:0], "row": values[:, 0]}
+    )
+    assert text.isascii()
+    assert text.count("\n") == 1
+    assert "\r" not in text
+    name, given = read(text)
+    assert (name, given["x"]) == ("a.js", 1)
+    np.testing.assert_array_equal(given["some"], values)
+    np.testing.assert_array_equal(given["row"][:, 0], values[:, 0])
+    assert given["none"].shape == (0, 3)
 
 
-def points(given):
-    return np.array(given["low"]) + unpacked(given["steps"]) / 65535 * given["side"]
+def test_letters_by_sevens_are_every_one_of_them():
+    letters = bytes(range(128))
+    bits = np.unpackbits(np.frombuffer(letters, np.uint8)).reshape(-1, 8)[:, 1:]
+    inside = viewer.sevens(np.packbits(bits).tobytes())
+    assert json.loads(f'"{inside}"', strict=False) == letters.decode()
+    assert eights(json.loads(f'"{viewer.sevens(b"any")}"', strict=False)) == b"any"
+
+
+def test_steps_wrap_around():
+    values = np.array([[3, 250], [1, 4]], np.uint8)
+    steps = viewer.steps(values)
+    assert steps.tolist() == [[3, 250], [254, 10]]
+    np.testing.assert_array_equal(np.cumsum(steps, axis=0, dtype=np.uint8), values)
+
+
+def places(surprises, corners, bits):
+    """Undoes `surprises`, face by face as the viewer does."""
+    found = np.zeros((corners.max() + 1, surprises.shape[1]), int)
+    opposite, seen, before = {}, set(), None
+    rest = iter(surprises)
+    for face in corners.tolist():
+        for k, row in enumerate(face):
+            if row in seen:
+                continue
+            seen.add(row)
+            one, two = face[(k + 1) % 3], face[(k + 2) % 3]
+            three = opposite.get(frozenset((one, two)))
+            if three is not None:
+                guess = found[one] + found[two] - found[three]
+            else:
+                guess = 0 if before is None else found[before]
+            wrong = next(rest)
+            found[row] = (guess + np.where(wrong % 2, -(wrong + 1) // 2, wrong // 2)) % 2**bits
+            before = row
+        for k in range(3):
+            opposite.setdefault(frozenset((face[k], face[(k + 1) % 3])), face[(k + 2) % 3])
+    return found
+
+
+def test_surprises_are_undone_and_small_on_a_plane():
+    mesh, _, _ = viewer.ordered(sheet())
+    x, y, _ = mesh.vertices.T
+    box, flat_places = viewer.quantised(np.stack([x, y], axis=1), 14)
+    assert box["bits"] == 14
+    given = viewer.surprises(flat_places, mesh.faces, 14)
+    np.testing.assert_array_equal(places(given, mesh.faces, 14), flat_places)
+    assert np.quantile(given, 0.9) <= 6  # affine: nothing but rounding, and the first faces
+    anywhere = np.random.default_rng(0).integers(0, 2**14, flat_places.shape)
+    given = viewer.surprises(anywhere, mesh.faces, 14)
+    assert given.max() < 2**14
+    np.testing.assert_array_equal(places(given, mesh.faces, 14), anywhere)
+
+
+def shape(mesh):
+    """What is read of a shape: all, and its faces."""
+    camera = render.camera(mesh, np.eye(3)[2], np.eye(3)[1])
+    sky = np.linspace(0, 1, 2 * len(mesh.vertices)).reshape(-1, 2)
+    _, given = read(viewer.script("a.js", *viewer.shape(mesh, camera, sky)))
+    assert given["axes"] == camera.axes.tolist()
+    faces, highest = [], 0
+    for below in given["faces"].reshape(-1):
+        faces.append(highest - below)
+        highest += below == 0
+    return given, np.array(faces).reshape(-1, 3), sky
 
 
 def test_a_shape_is_given_to_a_65535th_of_its_size():
     mesh = sheet()
-    camera = render.camera(mesh, np.eye(3)[2], np.eye(3)[1])
-    given = viewer.shape(mesh, camera)
-    order = unpacked(given["order"])[:, 0].astype(int)
+    # In pieces, one of them turned over, and with a vertex that no face has.
+    mesh = Mesh(
+        np.concatenate([[[9.0, 9, 9]], mesh.vertices, mesh.vertices + 2]),
+        np.concatenate([mesh.faces + 1, mesh.faces[:, ::-1] + 1 + len(mesh.vertices)])[::-1],
+    )
+    given, faces, sky = shape(mesh)
+    order = np.cumsum(given["order"][:, 0]) % 2**32
     assert sorted(order) == list(range(len(mesh.faces)))
-    corners = points(given["vertices"])[unpacked(given["faces"]).astype(int)]
-    np.testing.assert_allclose(corners, mesh.vertices[mesh.faces[order]], atol=0.5 / 65535)
-    assert given["axes"] == camera.axes.tolist()
+    box = given["box"]
+    found = places(given["vertices"], faces, 16) / 65535 * box["side"] + box["low"]
+    assert len(found) == len(mesh.vertices) - 1
+    expected = mesh.vertices[mesh.faces[order]]
+    np.testing.assert_allclose(found[faces], expected, atol=box["side"] / 65535)
+    light = places(given["sky"], faces, 8) / 255
+    np.testing.assert_allclose(light[faces], sky[mesh.faces[order]], atol=1 / 255)
 
 
 def data(mesh, result):
+    """A map, and what is read of it."""
     found = Map(mesh, result)
     state = {"spanning": found.spanning, "flipped": found.flipped}
     heat = {"angle": (found.angle, 0.0, 2.0)}
-    return found, viewer.uv_map(mesh, result, found.uv, distortion=heat, **state)
+    made = viewer.uv_map(mesh, result, found.uv, distortion=heat, **state)
+    return found, read(viewer.script("a.js", *made))[1]
+
+
+def drawn(mesh, given):
+    """The old numbers of the faces, and the rows and uv of their corners."""
+    near, order, _ = viewer.ordered(mesh)
+    corners = near.faces.reshape(-1).copy()
+    place, row = np.cumsum(given["moved"], axis=0).T % 2**32
+    corners[place] = row
+    corners, box = corners.reshape(-1, 3), given["box"]
+    uv = places(given["uv"], corners, 14) / 16383 * box["side"] + box["low"]
+    return order, corners, uv[corners]
 
 
 def test_a_map_that_is_not_cut_lists_no_corners():
     mesh = sheet()
     found, given = data(mesh, flat(mesh))
-    assert given["moved"]["rows"] == 0
-    assert given["seams"]["rows"] == 0
-    assert given["border"]["rows"] == 4 * 8
-    near, order = viewer.ordered(mesh)
-    uv = points(given["uv"])[near.faces]
-    np.testing.assert_allclose(uv, found.uv[order], atol=given["uv"]["side"] / 65535)
+    assert len(given["moved"]) == 0
+    assert len(given["seams"]) == 0
+    assert len(given["border"]) == 4 * 8
+    order, _, uv = drawn(mesh, given)
+    np.testing.assert_allclose(uv, found.uv[order], atol=given["box"]["side"] / 16383)
+    expected = viewer.levels(found.angle, 0.0, 2.0)[order]
+    np.testing.assert_array_equal(np.cumsum(given["angle"]) % 256, expected)
 
 
 def test_a_cut_map_comes_back_with_its_seams():
@@ -70,32 +173,21 @@ def test_a_cut_map_comes_back_with_its_seams():
         + np.arange(len(mesh.faces)).repeat(3)[:, None]
     )
     found, given = data(mesh, Parameterization(uv, np.arange(len(uv)).reshape(-1, 3)))
-    assert given["border"]["rows"] == 0
-    assert given["seams"]["rows"] == 3 * len(mesh.faces)
-    near, order = viewer.ordered(mesh)
-    corners = near.faces.reshape(-1).copy()
-    place, row = unpacked(given["moved"]).T.astype(int)
-    corners[place] = row
-    assert len(np.unique(corners)) == len(corners)
-    again = points(given["uv"])[corners].reshape(-1, 3, 2)
-    np.testing.assert_allclose(again, found.uv[order], atol=given["uv"]["side"] / 65535)
+    assert len(given["border"]) == 0
+    assert len(given["seams"]) == 3 * len(mesh.faces)
+    order, corners, again = drawn(mesh, given)
+    assert len(np.unique(corners)) == corners.size
+    np.testing.assert_allclose(again, found.uv[order], atol=given["box"]["side"] / 16383)
 
 
 def test_levels_of_a_scale():
     given = viewer.levels(np.array([-1.0, 0.0, 1.0, 2.0, np.inf, np.nan]), 0.0, 2.0)
-    assert given.tolist() == [0, 0, 31, 62, 62, 63]
-
-
-def test_a_script_holds_one_object():
-    text = viewer.script("a.js", {"x": [1, 2]})
-    name, content = text.removeprefix("received[").rstrip(";\n").split("]=", 1)
-    assert json.loads(name) == "a.js"
-    assert json.loads(content) == {"x": [1, 2]}
+    assert given.tolist() == [0, 0, 15, 30, 30, 31]
 
 
 def test_a_large_model_is_left_out_and_said(monkeypatch):
     monkeypatch.setattr(viewer, "LARGEST", 10)
     mesh = sheet()
     camera = render.camera(mesh, np.eye(3)[2], np.eye(3)[1])
-    assert viewer.shape(mesh, camera) == {"large": 128}
+    assert viewer.shape(mesh, camera, np.ones((81, 2))) == ({"large": 128}, {})
     assert data(mesh, flat(mesh))[1] == {"large": 128}
