@@ -1,10 +1,11 @@
 """A map of a planar domain to the plane without flips or overlaps, nearly conformal, of even scale.
 
-Tutte's embedding is bijective. From it energies are brought down in turn, with the space around the
-map triangulated too and kept from turning over, so that the boundary never crosses itself (Jiang,
-Schaefer and Panozzo 2017, "Simplicial complex augmentation framework for bijective maps"; libigl
-has it, on J. R. Shewchuk's Triangle). Isometric energies come first: of the many maps that are
-nearly conformal, the descent on the conformal energy then finds one of even scale.
+It is near to a planar layout of even scale, which may cover itself. One that does not is a start;
+else Tutte's embedding is one, which is bijective, and an isometric energy of the map from it to the
+layout is brought down. Last comes the conformal energy of the surface. In all of this the space
+around the map is triangulated too and kept from turning over, so that the boundary never crosses
+itself (Jiang, Schaefer and Panozzo 2017, "Simplicial complex augmentation framework for bijective
+maps"; libigl has it, on J. R. Shewchuk's Triangle).
 """
 
 from __future__ import annotations
@@ -19,12 +20,11 @@ from scipy.sparse.linalg import splu
 
 from parapoint.surface import FloatArray, IntArray, Mesh, edge_table
 
-DESCENTS = (igl.SYMMETRIC_DIRICHLET, igl.LOG_ARAP, igl.CONFORMAL)
-"""The energies in turn. Near an isometry libigl's first gives no numbers; the second goes on."""
 LEAST_GAIN = 0.02
 """A descent ends when a step lowers what is left of the energy by less than this share."""
-EXACT = 1e-14
-"""An excess of energy this small is none."""
+CLOSE, EXACT = 5e-4, 1e-14
+"""An excess of energy this small is none: on the way to the layout, which is no goal of its own,
+and of the map."""
 MOST_STEPS = 50
 """Steps of a descent at most."""
 FLATTEST = 1e-22
@@ -35,8 +35,12 @@ class BijectionError(RuntimeError):
     """No bijective map was found; the message says why."""
 
 
-def bijective_map(mesh: Mesh) -> FloatArray:
+def bijective_map(mesh: Mesh, layout: FloatArray) -> FloatArray:
     """(V, 2) a bijective map of a connected planar domain, faces counter-clockwise.
+
+    Args:
+        mesh: the domain.
+        layout: (V, 2) a nearly conformal map whose scale is wanted; faces may lie on one another.
 
     Raises:
         BijectionError: a face is flat, or in Tutte's embedding too small for numbers.
@@ -50,11 +54,41 @@ def bijective_map(mesh: Mesh) -> FloatArray:
     if not (np.isfinite(uv).all() and areas.min() > FLATTEST):
         raise BijectionError("its embedding in the disk has flat triangles")
     start = uv = uv / np.sqrt(areas.sum())
-    for energy in DESCENTS:
-        uv = _descended(mesh, uv, energy)
+    flat = Mesh(np.pad(layout, ((0, 0), (0, 1))), mesh.faces)
+    total = flat.face_areas.sum()
+    if is_bijective(mesh, layout):
+        uv = layout / np.sqrt(total)
+    elif flat.face_areas.min() > FLATTEST * total:
+        flat = Mesh(flat.vertices / np.sqrt(total), mesh.faces)
+        uv = _descended(flat, uv, igl.SYMMETRIC_DIRICHLET, CLOSE)
+    uv = _descended(mesh, uv, igl.CONFORMAL, EXACT)
     if uv is start:
         raise BijectionError("no step lowers its distortion")
     return np.asarray(size * uv)
+
+
+def is_bijective(mesh: Mesh, uv: FloatArray) -> bool:
+    """Whether a map (V, 2) of a planar domain is one to one, faces counter-clockwise.
+
+    Where no face is turned over it is if the images of the boundary's edges do not cross.
+    """
+    if not (signed_areas(uv, mesh.faces) > 0).all():
+        return False
+    start = np.concatenate(mesh.boundary_loops)
+    end = np.concatenate([np.roll(loop, -1) for loop in mesh.boundary_loops])
+    low, high = np.minimum(uv[start], uv[end]), np.maximum(uv[start], uv[end])
+    meets = ((low[:, None] <= high) & (low <= high[:, None])).all(axis=2)
+    one, other = np.nonzero(np.triu(meets, 1))
+    apart = (start[one] != end[other]) & (end[one] != start[other])
+    ends = start[one], end[one], start[other], end[other]
+    a, b, c, d = (uv[rows[apart]] for rows in ends)
+    return not ((_side(a, b, c) != _side(a, b, d)) & (_side(c, d, a) != _side(c, d, b))).any()
+
+
+def _side(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
+    """(n,) on which side of the line from a to b the point c is: 1 left, -1 right, 0 on it."""
+    first, second = b - a, c - a
+    return np.asarray(np.sign(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]))
 
 
 def tutte(mesh: Mesh) -> FloatArray:
@@ -92,8 +126,10 @@ def signed_areas(uv: FloatArray, faces: IntArray) -> FloatArray:
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
 
 
-def _descended(mesh: Mesh, uv: FloatArray, energy: igl.MappingEnergyType) -> FloatArray:
-    """(V, 2) the bijective map `uv` (V, 2) moved down an energy."""
+def _descended(
+    mesh: Mesh, uv: FloatArray, energy: igl.MappingEnergyType, least: float
+) -> FloatArray:
+    """(V, 2) the bijective map `uv` (V, 2) moved down an energy by steps that gain `least`."""
     state = triangle.SCAFData()
     triangle.scaf_precompute(
         np.asfortranarray(mesh.vertices),
@@ -111,7 +147,7 @@ def _descended(mesh: Mesh, uv: FloatArray, energy: igl.MappingEnergyType) -> Flo
         if not (signed_areas(moved, mesh.faces) > 0).all():  # nor if not a number
             break
         uv, after = moved, _excess(mesh, moved, energy)
-        if not before - after > LEAST_GAIN * after + EXACT:
+        if not before - after > LEAST_GAIN * after + least:
             break
         before = after
     return uv

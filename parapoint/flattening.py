@@ -2,7 +2,8 @@
 
 The cloud is triangulated, cut, and flattened by a bijective map. The cuts lead to where the scale
 of a conformal map, found by a linear solve, is most extreme (as in Sawhney and Crane 2017,
-"Boundary first flattening", section 6), and are as long as an even scale needs.
+"Boundary first flattening", section 6), and are as long as an even scale needs. The map is laid out
+by that scale (`parapoint.layout`), then made bijective (`parapoint.bijection`).
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from scipy.sparse import csgraph
 
 from parapoint.bijection import bijective_map, factored, signed_areas
 from parapoint.cutting import cut_along, cut_to_disk
+from parapoint.layout import scaled_layout
 from parapoint.reconstruction import ReconstructionError, triangulation
 from parapoint.surface import FloatArray, IntArray, Mesh
 
@@ -71,7 +73,7 @@ def flat_map(points: FloatArray) -> FlatMap:
     mesh = Mesh(points[reached], row[mesh.faces])
     try:
         disk = _seamed(mesh)
-        uv = bijective_map(disk)
+        uv = bijective_map(disk, scaled_layout(disk, _log_scale(disk), _laplacian(disk)))
     except (RuntimeError, np.linalg.LinAlgError) as error:  # a singular factor, no bijection
         raise ReconstructionError(f"the triangulation has no flat map ({error})") from None
     uv -= (uv.max(axis=0) + uv.min(axis=0)) / 2
@@ -147,10 +149,11 @@ def _joined_loops(mesh: Mesh) -> Mesh:
 def _scale_cuts(mesh: Mesh, budget: int) -> Mesh:
     """The planar domain cut from its boundary to where the scale is most extreme.
 
-    Of some tips the one with the largest gain for each cut edge is taken, until the area
-    discrepancy is small enough or `budget` edges are cut.
+    Extreme is what is far from the boundary and in its log scale from the mean area's. Of some such
+    tips the one with the largest gain for each cut edge is taken, until the area discrepancy is
+    small enough or `budget` edges are cut.
     """
-    scale = _log_scale(mesh)
+    scale, area = _log_scale(mesh), mesh.face_areas.sum()
     discrepancy = _area_discrepancy(mesh, scale)
     while discrepancy > AREA_DISCREPANCY:
         graph = _graph(mesh)
@@ -160,10 +163,11 @@ def _scale_cuts(mesh: Mesh, budget: int) -> Mesh:
             return_predecessors=True,
             min_only=True,
         )
+        extreme = distance * np.abs(scale - np.log(_mapped_areas(mesh, scale).sum() / area) / 2)
         candidates = []
         blocked = np.zeros(len(scale), dtype=bool)
         for _ in range(TIPS):
-            tip = int(np.where(blocked, -1.0, np.abs(scale)).argmax())
+            tip = int(np.where(blocked, -1.0, extreme).argmax())
             blocked |= np.isfinite(csgraph.dijkstra(graph, indices=tip, limit=distance[tip] / 2))
             path = _path(previous, tip)
             if not 0 < len(path) <= budget:
@@ -245,8 +249,13 @@ def _log_scale(mesh: Mesh, *, flat_loops: bool = True) -> FloatArray:
 
 def _area_discrepancy(mesh: Mesh, scale: FloatArray) -> float:
     """Σ |share of the mapped area − share of the area| over the faces, predicted from the scale."""
-    mapped = mesh.face_areas * np.exp(2 * np.clip(scale[mesh.faces].mean(axis=1), -30, 30))
+    mapped = _mapped_areas(mesh, scale)
     return float(np.abs(mapped / mapped.sum() - mesh.face_areas / mesh.face_areas.sum()).sum())
+
+
+def _mapped_areas(mesh: Mesh, scale: FloatArray) -> FloatArray:
+    """(F,) areas of the faces in the metric of a log scale (V,)."""
+    return mesh.face_areas * np.exp(2 * np.clip(scale[mesh.faces].mean(axis=1), -30, 30))
 
 
 def _vertex_jacobians(mesh: Mesh, uv: FloatArray) -> FloatArray:
