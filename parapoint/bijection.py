@@ -1,8 +1,9 @@
 """A map of a planar domain to the plane without flips or overlaps, nearly conformal, of even scale.
 
-It is near to a planar layout of even scale, which may cover itself. One that does not is a start;
-else Tutte's embedding is one, which is bijective, and an isometric energy of the map from it to the
-layout is brought down. Last comes the conformal energy of the surface. In all of this the space
+A planar layout of even scale that does not cover itself is the start. From another one the map goes
+towards it: Tutte's embedding is bijective, and an isometric energy of the map from it to the
+layout, or to the surface where there is no layout, is brought down. Last comes the conformal
+energy: of the many maps that are nearly conformal it then finds one of even scale. In all of this the space
 around the map is triangulated too and kept from turning over, so that the boundary never crosses
 itself (Jiang, Schaefer and Panozzo 2017, "Simplicial complex augmentation framework for bijective
 maps"; libigl has it, on J. R. Shewchuk's Triangle).
@@ -20,6 +21,9 @@ from scipy.sparse.linalg import splu
 
 from parapoint.surface import FloatArray, IntArray, Mesh, edge_table
 
+ISOMETRIC = (igl.SYMMETRIC_DIRICHLET, igl.LOG_ARAP)
+"""The isometric energies in turn. Near an isometry libigl's first gives no numbers; the second goes
+on."""
 LEAST_GAIN = 0.02
 """A descent ends when a step lowers what is left of the energy by less than this share."""
 CLOSE, EXACT = 5e-4, 1e-14
@@ -35,18 +39,19 @@ class BijectionError(RuntimeError):
     """No bijective map was found; the message says why."""
 
 
-def bijective_map(mesh: Mesh, layout: FloatArray) -> FloatArray:
+def bijective_map(mesh: Mesh, layout: FloatArray | None) -> FloatArray:
     """(V, 2) a bijective map of a connected planar domain, faces counter-clockwise.
 
     Args:
         mesh: the domain.
-        layout: (V, 2) a nearly conformal map whose scale is wanted; faces may lie on one another.
+        layout: (V, 2) a nearly conformal map whose scale is wanted, faces perhaps on one another;
+            None where none is known.
 
     Raises:
         BijectionError: a face is flat, or in Tutte's embedding too small for numbers.
     """
     size = np.sqrt(mesh.face_areas.sum())
-    mesh = Mesh(mesh.vertices / size, mesh.faces)
+    mesh = _of_area_one(mesh.vertices, mesh.faces)
     if not mesh.face_areas.min() > FLATTEST:
         raise BijectionError("a face has no area")
     uv = tutte(mesh)
@@ -54,17 +59,24 @@ def bijective_map(mesh: Mesh, layout: FloatArray) -> FloatArray:
     if not (np.isfinite(uv).all() and areas.min() > FLATTEST):
         raise BijectionError("its embedding in the disk has flat triangles")
     start = uv = uv / np.sqrt(areas.sum())
-    flat = Mesh(np.pad(layout, ((0, 0), (0, 1))), mesh.faces)
-    total = flat.face_areas.sum()
-    if is_bijective(mesh, layout):
-        uv = layout / np.sqrt(total)
-    elif flat.face_areas.min() > FLATTEST * total:
-        flat = Mesh(flat.vertices / np.sqrt(total), mesh.faces)
+    flat = None if layout is None else _of_area_one(np.pad(layout, ((0, 0), (0, 1))), mesh.faces)
+    if flat is not None and is_bijective(flat, flat.vertices[:, :2]):
+        uv = flat.vertices[:, :2]
+    elif flat is not None and flat.face_areas.min() > FLATTEST:
         uv = _descended(flat, uv, igl.SYMMETRIC_DIRICHLET, CLOSE)
+    else:
+        for energy in ISOMETRIC:
+            uv = _descended(mesh, uv, energy, EXACT)
     uv = _descended(mesh, uv, igl.CONFORMAL, EXACT)
     if uv is start:
         raise BijectionError("no step lowers its distortion")
     return np.asarray(size * uv)
+
+
+def _of_area_one(vertices: FloatArray, faces: IntArray) -> Mesh:
+    """A mesh scaled so; as it is where it has no area."""
+    area = Mesh(vertices, faces).face_areas.sum()
+    return Mesh(vertices / (np.sqrt(area) or 1.0), faces)
 
 
 def is_bijective(mesh: Mesh, uv: FloatArray) -> bool:

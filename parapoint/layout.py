@@ -10,6 +10,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from parapoint.bijection import factored
+from parapoint.scale import laplacian
 from parapoint.surface import FloatArray, IntArray, Mesh
 
 LARGEST_SCALE = 8.0
@@ -18,8 +19,8 @@ COTANGENTS = (0.02, 20.0)
 """Range of twice the weight of a face at an edge, so that all are positive."""
 
 
-def scaled_layout(mesh: Mesh, scale: FloatArray, laplacian: sparse.csc_matrix) -> FloatArray:
-    """(V, 2) the conformal map of a planar domain whose log scale is nearest to `scale` (V,).
+def scaled_layout(mesh: Mesh, scale: FloatArray) -> FloatArray:
+    """(V, 2) the conformal map of a disk whose log scale is nearest to `scale` (V,).
 
     In a metric scaled by e^u the turn from one triangle's frame to the next one's changes by the
     flow of u along their edge, (Δu)_ij = w_ij (u_i − u_j). Where Δu is minus the angle defect it
@@ -29,12 +30,11 @@ def scaled_layout(mesh: Mesh, scale: FloatArray, laplacian: sparse.csc_matrix) -
 
     Args:
         mesh: connected and consistently oriented.
-        scale: (V,) log scale that flattens the mesh with respect to `laplacian`.
-        laplacian: (V, V) the one that it solves.
+        scale: (V,) log scale that flattens it, such as those of `parapoint.scale`.
     """
     edges = _flat_edges(mesh)
     size = np.exp(np.clip(scale, -LARGEST_SCALE, LARGEST_SCALE)[mesh.faces].mean(axis=1))
-    angle = _frames(mesh, edges, scale, laplacian)
+    angle = _frames(mesh, edges, scale)
     wanted = ((size * np.exp(1j * angle))[:, None] * edges).reshape(-1)
     one, other = np.roll(edges, -2, axis=1), -np.roll(edges, -1, axis=1)  # to the opposite corner
     product = -one.conj() * other
@@ -64,15 +64,13 @@ def _flat_edges(mesh: Mesh) -> np.ndarray:
     return np.stack([length + 0j, apex - length, -apex], axis=1)
 
 
-def _frames(
-    mesh: Mesh, edges: np.ndarray, scale: FloatArray, laplacian: sparse.csc_matrix
-) -> FloatArray:
+def _frames(mesh: Mesh, edges: np.ndarray, scale: FloatArray) -> FloatArray:
     """(F,) the angle by which each triangle's plane is turned, by transport from the first one."""
     order = np.argsort(mesh.edge_of_halfedge, kind="stable")
     twin = np.diff(mesh.edge_of_halfedge[order]) == 0
     one, other = order[:-1][twin], order[1:][twin]
     start, end = mesh.halfedges[one].T
-    flow = np.asarray(laplacian[start, end]).reshape(-1) * (scale[end] - scale[start])
+    flow = np.asarray(laplacian(mesh)[start, end]).reshape(-1) * (scale[end] - scale[start])
     heading = np.angle(edges).reshape(-1)
     turn = heading[one] - heading[other] - np.pi + flow
     count = len(mesh.faces)
