@@ -1,12 +1,12 @@
-"""A map of a planar domain to the plane without flips or overlaps, nearly conformal, of even scale.
+"""A nearly conformal map of a planar domain to the plane without flips or overlaps, of even scale.
 
 A planar layout of even scale that does not cover itself is the start. From another one the map goes
 towards it: Tutte's embedding is bijective, and an isometric energy of the map from it to the
 layout, or to the surface where there is no layout, is brought down. Last comes the conformal
-energy: of the many maps that are nearly conformal it then finds one of even scale. In all of this the space
-around the map is triangulated too and kept from turning over, so that the boundary never crosses
-itself (Jiang, Schaefer and Panozzo 2017, "Simplicial complex augmentation framework for bijective
-maps"; libigl has it, on J. R. Shewchuk's Triangle).
+energy: of the many maps that are nearly conformal it then finds one of even scale. In all of this
+the space around the map is triangulated too and kept from turning over, so that the boundary never
+crosses itself (Jiang, Schaefer and Panozzo 2017, "Simplicial complex augmentation framework for
+bijective maps"; libigl has it, on J. R. Shewchuk's Triangle).
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ class BijectionError(RuntimeError):
 
 
 def bijective_map(mesh: Mesh, layout: FloatArray | None) -> FloatArray:
-    """(V, 2) a bijective map of a connected planar domain, faces counter-clockwise.
+    """(V, 2) a nearly conformal bijective map of a connected planar domain.
 
     Args:
-        mesh: the domain.
+        mesh: the domain, faces counter-clockwise.
         layout: (V, 2) a nearly conformal map whose scale is wanted, faces perhaps on one another;
             None where none is known.
 
@@ -51,14 +51,8 @@ def bijective_map(mesh: Mesh, layout: FloatArray | None) -> FloatArray:
         BijectionError: a face is flat, or in Tutte's embedding too small for numbers.
     """
     size = np.sqrt(mesh.face_areas.sum())
-    mesh = _of_area_one(mesh.vertices, mesh.faces)
-    if not mesh.face_areas.min() > FLATTEST:
-        raise BijectionError("a face has no area")
-    uv = tutte(mesh)
-    areas = signed_areas(uv, mesh.faces)
-    if not (np.isfinite(uv).all() and areas.min() > FLATTEST):
-        raise BijectionError("its embedding in the disk has flat triangles")
-    start = uv = uv / np.sqrt(areas.sum())
+    mesh, start = _embedded(mesh)
+    uv = start
     flat = None if layout is None else _of_area_one(np.pad(layout, ((0, 0), (0, 1))), mesh.faces)
     if flat is not None and is_bijective(flat, flat.vertices[:, :2]):
         uv = flat.vertices[:, :2]
@@ -71,6 +65,32 @@ def bijective_map(mesh: Mesh, layout: FloatArray | None) -> FloatArray:
     if uv is start:
         raise BijectionError("no step lowers its distortion")
     return np.asarray(size * uv)
+
+
+def isometric_map(mesh: Mesh) -> FloatArray:
+    """(V, 2) a bijective map of a connected planar domain of small symmetric Dirichlet energy.
+
+    Raises:
+        BijectionError: as of `bijective_map`.
+    """
+    size = np.sqrt(mesh.face_areas.sum())
+    return np.asarray(size * _descended(*_embedded(mesh), igl.SYMMETRIC_DIRICHLET, EXACT))
+
+
+def _embedded(mesh: Mesh) -> tuple[Mesh, FloatArray]:
+    """The mesh and Tutte's embedding (V, 2), both of area 1.
+
+    Raises:
+        BijectionError: as of `bijective_map`.
+    """
+    mesh = _of_area_one(mesh.vertices, mesh.faces)
+    if not mesh.face_areas.min() > FLATTEST:
+        raise BijectionError("a face has no area")
+    uv = tutte(mesh)
+    areas = signed_areas(uv, mesh.faces)
+    if not (np.isfinite(uv).all() and areas.min() > FLATTEST):
+        raise BijectionError("its embedding in the disk has flat triangles")
+    return mesh, np.asarray(uv / np.sqrt(areas.sum()))
 
 
 def _of_area_one(vertices: FloatArray, faces: IntArray) -> Mesh:

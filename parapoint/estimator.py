@@ -25,6 +25,7 @@ from torch import Tensor
 from parapoint.anchored import AnchoredNetworks, Anchors
 from parapoint.charts import Chart, Charts
 from parapoint.components import components
+from parapoint.denoising import denoised
 from parapoint.errors import InputError
 from parapoint.flattening import flat_map
 from parapoint.losses import DISTORTIONS, EIGENVALUES
@@ -424,12 +425,14 @@ class ParaPoint:
     def _start(self, cloud: FloatArray) -> tuple[SubNetworks | None, dict[str, object]]:
         """Networks that hold a computed map of the cloud, and what the report says of it.
 
+        The map of a noisy point is that of the place on the surface where it belongs.
         Where none can be computed they are None, and `preset_` becomes the one that trains.
         """
         _, rows = np.unique(np.round(cloud / COINCIDENT), axis=0, return_index=True)
         cloud = cloud[np.sort(rows)]
+        still = denoised(cloud)
         try:
-            flat = flat_map(cloud)
+            flat = flat_map(still)
         except ReconstructionError as error:
             logger.warning("no map could be computed, so one is trained: %s", error)
             self.preset_ = self._with_parameters(SMOOTH)
@@ -442,7 +445,8 @@ class ParaPoint:
         assert isinstance(networks, AnchoredNetworks)
         anchors = Anchors(cloud[flat.anchors], flat.uv, flat.jacobians)
         networks.hold(anchors, flat.inverse_jacobians)
-        return networks, {"map": "computed", "anchors": len(flat.anchors), "found": flat.facts}
+        facts = {"anchors": len(flat.anchors), "denoised": still is not cloud, "found": flat.facts}
+        return networks, {"map": "computed", **facts}
 
     def _record(self, step: Step, watched: FloatArray | None) -> None:
         """Append a step to the trace, with a map of the points watched where one is due."""
