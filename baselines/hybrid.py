@@ -52,11 +52,10 @@ class ParaPointSLIM:
 
     ParaPoint maps the vertices; along its seam, made a clean path of edges (`parapoint.spanning`),
     the mesh is cut. SLIM (M. Rabinovich et al. 2017) starts from a bijective map of small energy
-    (`parapoint.bijection`), or from ParaPoint's map where that has less and is one to one on the cut
-    mesh. A step after which the boundary would cross
-    itself is taken anew with the vertices that cross held where they are, so the map stays one to
-    one. Then the seam grows to where the map is most distorted (X. Gu et al. 2002, "Geometry
-    images"), as long as that pays.
+    (`parapoint.bijection`), or from ParaPoint's map where that has less and is one to one on the
+    cut mesh. A step after which the boundary would cross itself is taken anew with the vertices
+    that cross held where they are, so the map stays one to one. Then the seam grows to where the
+    map is most distorted (X. Gu et al. 2002, "Geometry images"), as long as that pays.
 
     A disk, with or without holes, is cut only where that pays.
 
