@@ -11,6 +11,8 @@ bijective maps"; libigl has it, on J. R. Shewchuk's Triangle).
 
 from __future__ import annotations
 
+import math
+import time
 from typing import Any
 
 import igl
@@ -39,13 +41,15 @@ class BijectionError(RuntimeError):
     """No bijective map was found; the message says why."""
 
 
-def bijective_map(mesh: Mesh, layout: FloatArray | None) -> FloatArray:
+def bijective_map(mesh: Mesh, layout: FloatArray | None, deadline: float = math.inf) -> FloatArray:
     """(V, 2) a nearly conformal bijective map of a connected planar domain.
 
     Args:
         mesh: the domain, faces counter-clockwise.
         layout: (V, 2) a nearly conformal map whose scale is wanted, faces perhaps on one another;
             None where none is known.
+        deadline: no step begins after this time of `time.monotonic`: the map is then as far as it
+            came.
 
     Raises:
         BijectionError: a face is flat, or in Tutte's embedding too small for numbers.
@@ -57,12 +61,12 @@ def bijective_map(mesh: Mesh, layout: FloatArray | None) -> FloatArray:
     if flat is not None and is_bijective(flat, flat.vertices[:, :2]):
         uv = flat.vertices[:, :2]
     elif flat is not None and flat.face_areas.min() > FLATTEST:
-        uv = _descended(flat, uv, igl.SYMMETRIC_DIRICHLET, CLOSE)
+        uv = _descended(flat, uv, igl.SYMMETRIC_DIRICHLET, CLOSE, deadline)
     else:
         for energy in ISOMETRIC:
-            uv = _descended(mesh, uv, energy, EXACT)
-    uv = _descended(mesh, uv, igl.CONFORMAL, EXACT)
-    if uv is start:
+            uv = _descended(mesh, uv, energy, EXACT, deadline)
+    uv = _descended(mesh, uv, igl.CONFORMAL, EXACT, deadline)
+    if uv is start and time.monotonic() < deadline:
         raise BijectionError("no step lowers its distortion")
     return np.asarray(size * uv)
 
@@ -159,7 +163,11 @@ def signed_areas(uv: FloatArray, faces: IntArray) -> FloatArray:
 
 
 def _descended(
-    mesh: Mesh, uv: FloatArray, energy: igl.MappingEnergyType, least: float
+    mesh: Mesh,
+    uv: FloatArray,
+    energy: igl.MappingEnergyType,
+    least: float,
+    deadline: float = math.inf,
 ) -> FloatArray:
     """(V, 2) the bijective map `uv` (V, 2) moved down an energy by steps that gain `least`."""
     state = triangle.SCAFData()
@@ -175,6 +183,8 @@ def _descended(
     )
     before = np.inf
     for _ in range(MOST_STEPS):
+        if time.monotonic() > deadline:
+            break
         moved = np.array(triangle.scaf_solve(1, state)[:, :2])
         if not (signed_areas(moved, mesh.faces) > 0).all():  # nor if not a number
             break

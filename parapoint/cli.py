@@ -13,7 +13,7 @@ import click
 import numpy as np
 import numpy.typing as npt
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from parapoint import console
 from parapoint.components import components
@@ -96,7 +96,7 @@ def map_(model: str, surface: str, out: str, device: str, as_json: bool) -> None
     fitted = ParaPoint.load(model, device=device)
     given = read_surface(surface)
     facts = _write(fitted, given, out, None)
-    _print(facts, as_json, f"{out}: {facts['points']} points mapped")
+    _print(facts, as_json, f"{out}: {facts['mapped_points']} points mapped")
 
 
 @parapoint.command()
@@ -168,17 +168,20 @@ def _bar() -> Iterator[Callable[[estimator.Progress], None]]:
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
+        TimeElapsedColumn(),
         TextColumn("{task.fields[loss]}"),
         TextColumn("{task.fields[remaining]}"),
     )
     with Progress(*columns, console=terminal, disable=not terminal.is_terminal) as progress:
-        task = progress.add_task("fit", total=1.0, loss="", remaining="")
+        # No end is known before the first step, as while a map is computed: the bar pulses.
+        task = progress.add_task("start", total=None, loss="", remaining="")
 
         def advance(now: estimator.Progress) -> None:
             shown: dict[str, Any] = {"remaining": f"{now.remaining:.0f} s left"}
             if now.step.losses:
                 shown["loss"] = f"loss {now.step.losses['total']:.4f}"
-            progress.update(task, completed=now.step.progress, description=now.step.phase, **shown)
+            done = now.step.progress
+            progress.update(task, completed=done, total=1.0, description=now.step.phase, **shown)
 
         yield advance
 
@@ -192,7 +195,7 @@ def _write(
     """Map a surface into the unit square and write it; what was written, as facts."""
     points = surface.vertices if isinstance(surface, Mesh) else surface.points
     uv = _in_unit_square(model, model.transform(points))
-    facts: dict[str, object] = {"file": out, "points": len(points)}
+    facts: dict[str, object] = {"file": out, "mapped_points": len(points)}
     if isinstance(surface, Mesh) and Path(out).suffix.lower() == ".obj":
         parameterization = opened(surface, uv)
         facts["spanning_faces"] = int((parameterization.corners != surface.faces).any(1).sum())

@@ -27,7 +27,7 @@ from parapoint.charts import Chart, Charts
 from parapoint.components import components
 from parapoint.denoising import denoised
 from parapoint.errors import InputError
-from parapoint.flattening import flat_map
+from parapoint.flattening import FlatMap, flat_map
 from parapoint.losses import DISTORTIONS, EIGENVALUES
 from parapoint.networks import ACTIVATIONS, Networks, SubNetworks, SurfaceNetworks
 from parapoint.parameterization import Parameterization, PointParameterization, TracePoint
@@ -38,7 +38,7 @@ from parapoint.trainer import PRECISIONS, DivergedError, Step, Trainer, surface_
 
 logger = logging.getLogger("parapoint")
 
-FORMAT = 2
+FORMAT = 3
 """Version of saved models and checkpoints."""
 FEWEST_POINTS = 100
 """Distinct points that a fit needs."""
@@ -46,11 +46,18 @@ FEWEST_VERTICES = 2_000
 """A mesh of fewer vertices is sampled on its faces instead: its vertices alone do not show it."""
 BATCH = {"cpu": 2_048, "cuda": 65_536}
 """Points mapped at a time: on a CPU the layers of so many stay in its cache."""
-COMPUTED_PER_SECOND = 400
-"""Points of a computed map for each second of the budget: it takes what it takes, at about 1,000
-points a second on one core, so a small budget gets fewer points."""
+TRIAL_PER_SECOND = 50
+"""Points of the first map for each second of the budget: it takes a twentieth of this at the 1,000
+points a second of one core, and is what there is where the machine is busy."""
+PLANNED = 0.4
+"""Share of the time left in which the second map would be done at the speed of the first. More
+points take up to twice as long each."""
+DESCENDING = 0.8
+"""Share of the budget after which a computed map is improved no more."""
 COINCIDENT = 1e-6
 """Points of a computed map that agree to this, in radii of the cloud, count as one."""
+MOST_COMPARED = 1_000_000
+"""Rows of a cloud among which repetitions are counted."""
 CHECKPOINT_SECONDS = 60.0
 KEPT_MAPS = 8
 """Maps kept in the trace of `parameterize`."""
@@ -90,7 +97,8 @@ class ParaPoint:
             "fast" the map is computed and held by the networks; only Deform is trained.
         points: training points.
         iterations: steps, the warm-up included.
-        time_budget: seconds of fitting; the schedule follows the time where that ends sooner.
+        time_budget: seconds of fitting; the schedule follows the time where that ends sooner, and
+            a computed map is of as many points as the machine, as busy as it is, allows.
         subset: points of a step before the last phase, which takes all.
         all_from: share of the run after which steps take all points.
         distortion: "conformal" or "isometric".
@@ -112,7 +120,7 @@ class ParaPoint:
         networks_: the trained networks.
         centre_, scale_: the points minus `centre_`, over `scale_`, are what the networks see.
         trace_: losses over the run.
-        report_: settings, final losses, time and device of the run.
+        report_: settings, final losses, time and device of the run, rows left out.
     """
 
     requires: ClassVar[frozenset[str]] = frozenset()
@@ -169,10 +177,12 @@ class ParaPoint:
 
         Args:
             points: (N, 3) coordinates, a PointCloud, or a Mesh (its vertices, or points on its
-                faces where they are few). Rows that are not finite are left out. Units are free.
+                faces where they are few). Rows that are not finite are left out, repeated ones
+                count once; `report_` has the numbers. Units are free.
             y: not used.
             checkpoint: folder where the state is saved each minute. A fit that finds the state of
-                the same run there goes on from it; at the end the state is removed.
+                the same run there goes on from it; at the end the state is removed. Not used where
+                the map is computed within a time budget, which begins anew.
             callback: called after each step.
 
         Raises:
@@ -312,37 +322,45 @@ class ParaPoint:
         callback: Callable[[Progress], None] | None,
     ) -> Self:
         """`fit`; the trace gets maps of the points `watched`."""
+        begun = time.monotonic()
         self.preset_, device = self._checked()
+        surface = _surface(surface)
+        left_out = _left_out(surface)
         if self.components != "together":
-            parts = components(_surface(surface))
+            parts = components(surface)
             if self.components == "each" and len(parts) > 1:
-                return self._fit_each(parts, device, checkpoint, callback)
+                self._fit_each(parts, device, checkpoint, callback)
+                self.report_ |= left_out
+                return self
             if len(parts) > 1:
                 logger.warning("%d components: the largest is fitted", len(parts))
             surface = parts[0]
-        self.points_ = training_points(surface, self._most_points(), self.seed)
-        self._frame()
-        cloud = (self.points_ - self.centre_) / self.scale_
-        begun = time.monotonic()
         with _threads(self.threads):
-            start, found = self._start(cloud) if self.preset_.is_computed else (None, {})
+            if self.preset_.is_computed:
+                start, found = self._start(surface, begun)
+            else:
+                start, found = None, {}
+                self._draw(surface, self.preset_.points)
             trainer = Trainer(
-                cloud,
+                self._framed(),
                 self.preset_,
                 seed=self.seed,
                 device=device,
                 time_budget=self.time_budget,
                 networks=start,
-                seconds=time.monotonic() - begun,
             )
             self.networks_: SurfaceNetworks = trainer.networks
             self.charts_: list[dict[str, Any]] = []
             self.trace_: tuple[TracePoint, ...] = ()
-            store = None if checkpoint is None else _Checkpoint(Path(checkpoint), self._identity())
+            store = None
+            if checkpoint is not None and (start is None or self.time_budget is None):
+                store = _Checkpoint(Path(checkpoint), self._identity())
             if store is not None and (state := store.read()) is not None:
                 tensors, facts = state
                 trainer.resume(tensors, facts["trainer"])
                 self.trace_ = tuple(TracePoint(*row) for row in facts["trace"])
+            trainer.seconds += time.monotonic() - begun
+            remaining = _remaining(trainer)
             begun = time.monotonic() - trainer.seconds
             try:
                 for step in trainer.run():
@@ -351,15 +369,18 @@ class ParaPoint:
                     if store is not None:
                         store.write_each_minute(trainer, self.trace_)
                     if callback is not None:
-                        left = step.seconds * (1 - step.progress) / step.progress
-                        callback(Progress(step, left))
+                        callback(Progress(step, remaining(step)))
             except DivergedError:
                 if start is None:
                     raise
                 # Deform alone was trained: the computed map is whole without it.
         if store is not None:
             store.remove()
-        self.report_ = self._report(trainer, device, time.monotonic() - begun) | found
+        self.report_: dict[str, object] = {
+            **self._report(trainer, device, time.monotonic() - begun),
+            **found,
+            **left_out,
+        }
         if trainer.divergences:
             times = "once and went on with a smaller step" if trainer.divergences == 1 else "twice"
             logger.warning("training diverged %s", times)
@@ -371,7 +392,7 @@ class ParaPoint:
         device: str,
         checkpoint: str | Path | None,
         callback: Callable[[Progress], None] | None,
-    ) -> Self:
+    ) -> None:
         """`fit` of each component, with its share of the points and of the time.
 
         A fit that goes on from a checkpoint begins finished components anew.
@@ -387,7 +408,7 @@ class ParaPoint:
             models.append(own.fit(part, checkpoint=folder, callback=callback))
             if folder is not None and folder.is_dir():
                 folder.rmdir()
-        self.points_ = np.concatenate([model.points_ for model in models])
+        self.points_: FloatArray = np.concatenate([model.points_ for model in models])
         self._frame()
         charts = [
             Chart(m.networks_, m.points_, m.transform(m.points_), m.centre_, m.scale_)
@@ -408,31 +429,41 @@ class ParaPoint:
             "iterations": sum(int(str(m.report_["iterations"])) for m in models),
             "seconds": round(sum(float(str(m.report_["seconds"])) for m in models), 3),
         }
-        return self
 
     def _frame(self) -> None:
         """`centre_` and `scale_` of `points_`: centre of the box at 0, largest norm 1."""
-        self.centre_ = (self.points_.min(axis=0) + self.points_.max(axis=0)) / 2
-        self.scale_ = float(np.linalg.norm(self.points_ - self.centre_, axis=1).max())
+        self.centre_: FloatArray = (self.points_.min(axis=0) + self.points_.max(axis=0)) / 2
+        self.scale_: float = float(np.linalg.norm(self.points_ - self.centre_, axis=1).max())
 
-    def _most_points(self) -> int:
-        """Most training points: the preset's, or what a map can be computed of in the budget."""
-        count = self.preset_.points
-        if not self.preset_.is_computed or self.time_budget is None:
-            return count
-        return min(count, max(FEWEST_POINTS, round(COMPUTED_PER_SECOND * self.time_budget)))
+    def _draw(self, surface: Surface, count: int) -> None:
+        """Draw at most `count` training points of the surface."""
+        self.points_ = training_points(surface, count, self.seed)
+        self._frame()
 
-    def _start(self, cloud: FloatArray) -> tuple[SubNetworks | None, dict[str, object]]:
-        """Networks that hold a computed map of the cloud, and what the report says of it.
+    def _framed(self) -> FloatArray:
+        """(n, 3) the training points as the networks see them."""
+        return np.asarray((self.points_ - self.centre_) / self.scale_)
+
+    def _start(
+        self, surface: Surface, begun: float
+    ) -> tuple[SubNetworks | None, dict[str, object]]:
+        """Networks that hold a computed map of the surface, and what the report says of it.
 
         The map of a noisy point is that of the place on the surface where it belongs.
         Where none can be computed they are None, and `preset_` becomes the one that trains.
+
+        Args:
+            surface: what the training points are drawn from.
+            begun: when the fit began, by `time.monotonic`.
         """
-        _, rows = np.unique(np.round(cloud / COINCIDENT), axis=0, return_index=True)
-        cloud = cloud[np.sort(rows)]
-        still = denoised(cloud)
+        budget, count = self.time_budget, self.preset_.points
+        deadline = math.inf if budget is None else begun + DESCENDING * budget
         try:
-            flat = flat_map(still)
+            if budget is None:
+                cloud, flat = self._flat_map(surface, count, deadline)
+            else:
+                few = min(count, max(FEWEST_POINTS, round(TRIAL_PER_SECOND * budget)))
+                cloud, flat = self._flat_map_within(surface, few, deadline)
         except ReconstructionError as error:
             logger.warning("no map could be computed, so one is trained: %s", error)
             self.preset_ = self._with_parameters(SMOOTH)
@@ -445,8 +476,57 @@ class ParaPoint:
         assert isinstance(networks, AnchoredNetworks)
         anchors = Anchors(cloud[flat.anchors], flat.uv, flat.jacobians)
         networks.hold(anchors, flat.inverse_jacobians)
-        facts = {"anchors": len(flat.anchors), "denoised": still is not cloud, "found": flat.facts}
-        return networks, {"map": "computed", **facts}
+        cut_short = time.monotonic() > deadline
+        if cut_short:
+            logger.warning(
+                "the time was up before the map was at its best; it is of %d points", len(cloud)
+            )
+        facts = {"map": "computed", "anchors": len(flat.anchors), "found": flat.facts}
+        return networks, {**facts, "cut_short": cut_short}
+
+    def _flat_map(
+        self, surface: Surface, count: int, deadline: float
+    ) -> tuple[FloatArray, FlatMap]:
+        """At most `count` training points as the networks see them, none twice, and their map."""
+        self._draw(surface, count)
+        cloud = self._framed()
+        _, rows = np.unique(np.round(cloud / COINCIDENT), axis=0, return_index=True)
+        cloud = cloud[np.sort(rows)]
+        still = denoised(cloud)
+        flat = flat_map(still, deadline)
+        return cloud, flat._replace(facts={**flat.facts, "denoised": still is not cloud})
+
+    def _flat_map_within(
+        self, surface: Surface, few: int, deadline: float
+    ) -> tuple[FloatArray, FlatMap]:
+        """`_flat_map` of as many points as the time up to `deadline` allows.
+
+        A map of `few` points comes first. It tells how fast this machine is on this surface, and
+        it stays where the second one fails, or is cut short and worse.
+        """
+        before = time.monotonic()
+        first: tuple[FloatArray, FlatMap] | None = None
+        try:
+            first = self._flat_map(surface, few, deadline)
+        except ReconstructionError as error:
+            fault = error
+        now = time.monotonic()
+        affordable = round(few * PLANNED * (deadline - now) / (now - before))
+        count = min(self.preset_.points, affordable)
+        if count > few == len(self.points_):
+            try:
+                second = self._flat_map(surface, count, deadline)
+            except ReconstructionError as error:
+                logger.warning("no map of %d points could be computed: %s", count, error)
+                fault = error
+            else:
+                is_whole = time.monotonic() < deadline
+                if first is None or is_whole or _conformality(second[1]) > _conformality(first[1]):
+                    return second
+            self._draw(surface, few)
+        if first is None:
+            raise fault
+        return first
 
     def _record(self, step: Step, watched: FloatArray | None) -> None:
         """Append a step to the trace, with a map of the points watched where one is due."""
@@ -540,7 +620,7 @@ class ParaPoint:
             yield BATCH[device.type], device
 
 
-def training_points(surface: npt.ArrayLike | Surface, count: int, seed: int) -> FloatArray:
+def training_points(surface: Surface, count: int, seed: int) -> FloatArray:
     """(n, 3) distinct training points: at most `count`, drawn evenly without repetition.
 
     Of a cloud, from its points; of a mesh, from the vertices of its faces, or from the faces by
@@ -555,7 +635,7 @@ def training_points(surface: npt.ArrayLike | Surface, count: int, seed: int) -> 
         if len(points) < FEWEST_VERTICES and surface.face_areas.sum() > 0:
             points = surface_sample(surface.vertices, surface.faces, count, seed)
     else:
-        points = surface.points if isinstance(surface, PointCloud) else _finite_rows(surface)
+        points = surface.points
     if len(points) > 10 * count:
         # Repetitions are looked for in a part: sorting millions of rows takes long.
         points = points[np.sort(rng.choice(len(points), 10 * count, replace=False))]
@@ -570,15 +650,16 @@ def training_points(surface: npt.ArrayLike | Surface, count: int, seed: int) -> 
     return np.ascontiguousarray(distinct)
 
 
-def _finite_rows(values: npt.ArrayLike) -> FloatArray:
-    """(N, 3) coordinates without the rows that are not finite, whose number is logged."""
-    points = np.asarray(values, dtype=np.float64)
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise InputError(f"points must have shape (n, 3), not {points.shape}")
-    finite = np.isfinite(points).all(axis=1)
-    if not finite.all():
-        logger.warning("dropped %d of %d points: not finite", (~finite).sum(), len(points))
-    return points[finite]
+def _left_out(surface: Surface) -> dict[str, object]:
+    """How many rows of a cloud were not finite, and how many repeat others (of a million)."""
+    if isinstance(surface, Mesh):
+        return {"dropped_not_finite": 0, "dropped_duplicates": 0}
+    points = surface.points[:MOST_COMPARED]
+    ordered = points[np.lexsort(points.T)]
+    repeated = int((ordered[1:] == ordered[:-1]).all(axis=1).sum())
+    if repeated:
+        logger.warning("%d of %d points repeat others and count once", repeated, len(points))
+    return {"dropped_not_finite": surface.dropped, "dropped_duplicates": repeated}
 
 
 def _coordinates(values: npt.ArrayLike | Surface, columns: int) -> FloatArray:
@@ -591,6 +672,20 @@ def _coordinates(values: npt.ArrayLike | Surface, columns: int) -> FloatArray:
     if array.ndim != 2 or array.shape[1] != columns or not np.isfinite(array).all():
         raise InputError(f"coordinates must be finite and of shape (n, {columns})")
     return array
+
+
+def _remaining(trainer: Trainer) -> Callable[[Step], float]:
+    """Seconds to the end of a run after a step, at the pace from now on."""
+    iteration, seconds = trainer.iteration, trainer.seconds
+
+    def remaining(step: Step) -> float:
+        pace = (step.seconds - seconds) / (step.iteration - iteration)
+        left = pace * (trainer.preset.iterations - step.iteration)
+        return (
+            left if trainer.time_budget is None else min(left, trainer.time_budget - step.seconds)
+        )
+
+    return remaining
 
 
 def _slices(count: int, batch: int) -> Iterator[slice]:
@@ -637,8 +732,23 @@ def _chart(facts: dict[str, Any]) -> SurfaceNetworks:
 
 
 def _surface(given: npt.ArrayLike | Surface) -> Surface:
-    """A surface, or the cloud of the finite rows of an array."""
-    return given if isinstance(given, Mesh | PointCloud) else PointCloud(_finite_rows(given))
+    """A surface, or the cloud of the finite rows of an array; the number of others is logged."""
+    if isinstance(given, Mesh | PointCloud):
+        return given
+    points = np.asarray(given, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise InputError(f"points must have shape (n, 3), not {points.shape}")
+    finite = np.isfinite(points).all(axis=1)
+    dropped = int((~finite).sum())
+    if dropped:
+        logger.warning("dropped %d of %d points: not finite", dropped, len(points))
+    return PointCloud(points[finite], dropped=dropped)
+
+
+def _conformality(flat: FlatMap) -> float:
+    """Mean ratio of the singular values of the map's Jacobians, 1 where it keeps all angles."""
+    values = np.linalg.svd(flat.jacobians, compute_uv=False)
+    return float((values[:, 1] / np.maximum(values[:, 0], 1e-300)).mean())
 
 
 def _preset_from(facts: dict[str, Any]) -> Preset:

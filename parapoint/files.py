@@ -230,7 +230,7 @@ def _point_cloud(content: Content, path: Path) -> PointCloud:
     if normals is not None and not np.isfinite(normals).all():
         logger.warning("%s: normals left out: some are not finite", path)
         normals = None
-    return PointCloud(content.vertices[finite], normals)
+    return PointCloud(content.vertices[finite], normals, int((~finite).sum()))
 
 
 def write_obj(

@@ -8,6 +8,7 @@ by that scale (`parapoint.layout`), then made bijective (`parapoint.bijection`).
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -54,8 +55,8 @@ class FlatMap(NamedTuple):
     facts: dict[str, Any]
 
 
-def flat_map(points: FloatArray) -> FlatMap:
-    """A nearly conformal map of distinct points (N, 3).
+def flat_map(points: FloatArray, deadline: float = math.inf) -> FlatMap:
+    """A nearly conformal map of distinct points (N, 3), less so where `deadline` ends the descents.
 
     Raises:
         ReconstructionError: the points show no surface that can be followed and flattened.
@@ -71,7 +72,7 @@ def flat_map(points: FloatArray) -> FlatMap:
     mesh = Mesh(points[reached], row[mesh.faces])
     try:
         disk = _seamed(mesh)
-        uv = bijective_map(disk, _layout(disk))
+        uv = bijective_map(disk, _layout(disk), deadline)
     except (RuntimeError, np.linalg.LinAlgError) as error:  # a singular factor, no bijection
         raise ReconstructionError(f"the triangulation has no flat map ({error})") from None
     uv -= (uv.max(axis=0) + uv.min(axis=0)) / 2

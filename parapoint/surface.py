@@ -224,6 +224,7 @@ class PointCloud:
     Attributes:
         points: (P, 3) float64 positions, finite, at least one.
         normals: (P, 3) float64 normals, or None.
+        dropped: rows that were left out before, as they were not finite; for reports.
 
     Raises:
         InputError: a shape or a value is not as said.
@@ -231,6 +232,7 @@ class PointCloud:
 
     points: FloatArray
     normals: FloatArray | None = None
+    dropped: int = 0
 
     def __post_init__(self) -> None:
         points = read_only(self.points, np.float64, "points", 3)

@@ -136,7 +136,9 @@ class Trainer:
         time_budget: seconds after which the run ends; the schedule follows the time where that
             comes before the preset's number of iterations.
         networks: what to train, all its parameters; new networks of the preset by default.
-        seconds: time that was spent before, part of the budget.
+
+    Attributes:
+        seconds: spent so far; what was spent before the run may be added, as part of the budget.
     """
 
     def __init__(
@@ -148,7 +150,6 @@ class Trainer:
         device: str,
         time_budget: float | None = None,
         networks: SurfaceNetworks | None = None,
-        seconds: float = 0.0,
     ) -> None:
         self.preset, self.time_budget = preset, time_budget
         self.generator = torch.Generator().manual_seed(seed)
@@ -170,7 +171,7 @@ class Trainer:
             self.hull = self.prepared(hull_sample(points, len(points), seed))
         self.noise = preset.perturbation * mean_spacing(points)
         self.iteration = 0
-        self.seconds = seconds
+        self.seconds = 0.0
         self.divergences = 0
         self._phase_now = ""
         self._lowest = math.inf

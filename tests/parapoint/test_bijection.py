@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 
 from benchmarks.metrics import evaluate
+from parapoint import bijection
 from parapoint.bijection import BijectionError, bijective_map, is_bijective, signed_areas, tutte
 from parapoint.parameterization import Parameterization
 from parapoint.surface import Mesh
@@ -89,3 +90,19 @@ def test_a_face_without_area_is_refused() -> None:
     points = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 1, 0]])
     with pytest.raises(BijectionError, match="no area"):
         bijective_map(Mesh(points, np.array([[0, 1, 2], [0, 2, 3]])), points[:, :2])
+
+
+def test_the_descents_end_with_the_time_and_leave_what_they_have(monkeypatch) -> None:
+    mesh = ramp()
+    whole = bijective_map(mesh, None)
+    steps = iter(range(1000))
+    monkeypatch.setattr(bijection.time, "monotonic", lambda: float(next(steps)))
+    some = bijective_map(
+        mesh, None, deadline=4.5
+    )  # five steps of the first descent, none of the others
+    assert score(mesh, some)["bijective"] == 1
+    start, end = (score(mesh, uv)["angle_difference_mean"] for uv in (tutte(mesh), whole))
+    assert end < score(mesh, some)["angle_difference_mean"] < start
+    none = bijective_map(mesh, None, deadline=0.0)
+    size = np.sqrt(mesh.face_areas.sum() / igl.doublearea(tutte(mesh), mesh.faces).sum() * 2)
+    np.testing.assert_allclose(none, size * tutte(mesh))

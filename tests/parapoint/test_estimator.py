@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 import torch
 
-from parapoint import InputError, Mesh, ParaPoint, PointCloud, presets
+from parapoint import InputError, Mesh, ParaPoint, PointCloud, estimator, presets
 from parapoint.estimator import training_points
+from parapoint.flattening import FlatMap, flat_map
 from parapoint.networks import Networks
 from parapoint.presets import PRESETS
+from parapoint.reconstruction import ReconstructionError
 from parapoint.testing import check_method, irregular_disk
 from parapoint.trainer import Trainer
 
@@ -82,7 +84,7 @@ def test_a_wrong_parameter_is_one_line(parameters: dict[str, object], message: s
     [
         (np.repeat(paraboloid(60), 5, axis=0), "60 distinct points; a fit needs at least 100"),
         (np.outer(np.linspace(0, 1, 500), [1.0, 2.0, 3.0]), "on a line"),
-        (np.full((500, 3), math.nan), "0 distinct points"),
+        (np.full((500, 3), math.nan), "at least one point"),
         (np.zeros((500, 2)), r"shape \(n, 3\)"),
     ],
 )
@@ -103,6 +105,7 @@ def test_rows_that_are_not_finite_are_dropped_and_counted(caplog) -> None:
     with caplog.at_level(logging.WARNING, logger="parapoint"):
         model = ParaPoint(**TINY).fit(holed)
     assert "dropped 1 of 401 points" in caplog.text
+    assert (model.report_["dropped_not_finite"], model.report_["dropped_duplicates"]) == (1, 0)
     assert np.array_equal(model.points_, ParaPoint(**TINY).fit(points).points_)
 
 
@@ -197,7 +200,7 @@ def test_a_model_of_another_version_or_a_damaged_one_is_one_line(fitted, tmp_pat
     fitted.save(tmp_path)
     text = (tmp_path / "model.json").read_text()
     (tmp_path / "model.json").write_text(json.dumps({**json.loads(text), "format": 99}))
-    with pytest.raises(InputError, match="format version 99; this parapoint reads version 2"):
+    with pytest.raises(InputError, match="format version 99; this parapoint reads version 3"):
         ParaPoint.load(tmp_path)
     (tmp_path / "model.json").write_text(text[:-20])
     with pytest.raises(InputError, match="damaged"):
@@ -309,10 +312,84 @@ def test_points_that_nearly_coincide_count_once() -> None:
     assert 400 <= model.report_["anchors"] <= 402  # a pair may lie on two sides of a rounding
 
 
-def test_a_small_budget_gets_fewer_computed_points() -> None:
-    model = ParaPoint(**{**FAST, "time_budget": 0.5}).fit(paraboloid())
-    assert model.report_["points"] == 200
+class Clock:
+    """Runs only while maps are computed: `pace` seconds a point, `slow` after the first map."""
+
+    def __init__(self, monkeypatch, pace: float, slow: float | None = None) -> None:
+        self.now, self.counts, self.change = 100.0, [], lambda flat: flat
+
+        def timed(points: np.ndarray, _: float) -> FlatMap:
+            self.counts.append(len(points))
+            is_first = len(self.counts) == 1
+            self.now += len(points) * (pace if is_first or slow is None else slow)
+            flat = flat_map(points)
+            return flat if is_first else self.change(flat)
+
+        monkeypatch.setattr(estimator.time, "monotonic", lambda: self.now)
+        monkeypatch.setattr(estimator.time, "perf_counter", lambda: self.now)
+        monkeypatch.setattr(estimator, "flat_map", timed)
+
+
+def test_a_time_budget_allows_as_many_computed_points_as_the_first_map_shows(monkeypatch) -> None:
+    clock = Clock(monkeypatch, pace=0.004)
+    model = ParaPoint(**FAST, time_budget=4.0).fit(paraboloid(700))
+    # 200 points take 0.8 s; the descents end after 3.2 s, and 40 % of what is left are planned.
+    assert clock.counts == [200, 240]
+    assert model.report_["anchors"] == model.report_["points"] == 240
+    assert not model.report_["cut_short"]
+
+
+def test_on_a_busy_machine_the_first_map_stays(monkeypatch) -> None:
+    clock = Clock(monkeypatch, pace=0.01)
+    model = ParaPoint(**FAST, time_budget=4.0).fit(paraboloid(700))
+    assert clock.counts == [200]
+    assert len(model.points_) == model.report_["anchors"] == 200
+
+
+def sheared(flat: FlatMap) -> FlatMap:
+    shear = np.diag([4.0, 1.0])
+    return flat._replace(uv=flat.uv @ shear, jacobians=shear @ flat.jacobians)
+
+
+@pytest.mark.parametrize(("change", "points"), [(lambda flat: flat, 240), (sheared, 200)])
+def test_a_map_that_is_cut_short_stays_where_it_is_the_better(
+    change, points: int, monkeypatch, caplog
+) -> None:
+    clock = Clock(monkeypatch, pace=0.004, slow=0.1)
+    clock.change = change
+    model = ParaPoint(**FAST, time_budget=4.0).fit(paraboloid(700) * [1, 1, 0])
+    assert clock.counts == [200, 240]
+    assert model.report_["points"] == model.report_["anchors"] == points
+    assert model.report_["cut_short"]
+    assert f"the time was up before the map was at its best; it is of {points}" in caplog.text
+
+
+def test_a_second_map_that_fails_leaves_the_first(monkeypatch, caplog) -> None:
+    def failed(_: FlatMap) -> FlatMap:
+        raise ReconstructionError("no surface")
+
+    Clock(monkeypatch, pace=0.004).change = failed
+    model = ParaPoint(**FAST, time_budget=4.0).fit(paraboloid(700))
+    assert model.report_["points"] == model.report_["anchors"] == 200
+    assert "no map of 240 points could be computed: no surface" in caplog.text
+
+
+def test_a_budget_that_is_spent_at_once_still_gives_a_map() -> None:
+    model = ParaPoint(**FAST, time_budget=1e-3).fit(paraboloid())
     assert model.report_["map"] == "computed"
+    assert model.report_["cut_short"]
+    uv = model.transform(paraboloid())
+    assert np.linalg.matrix_rank(uv - uv.mean(axis=0)) == 2
+
+
+def test_rows_that_were_left_out_are_counted_over_all_components(caplog) -> None:
+    points = np.concatenate([paraboloid(), paraboloid()[:30]])
+    cloud = PointCloud(np.concatenate([points, points + 1e3]), dropped=7)
+    for parts in ("each", "largest"):
+        model = ParaPoint(**{**TINY, "iterations": 1, "components": parts}).fit(cloud)
+        assert model.report_["dropped_not_finite"] == 7
+        assert model.report_["dropped_duplicates"] == 60
+    assert "60 of 860 points repeat others and count once" in caplog.text
 
 
 @pytest.mark.parametrize("branches", ["3d", "2d"])
@@ -355,6 +432,23 @@ def test_a_time_budget_ends_the_fit() -> None:
     model = ParaPoint(**{**TINY, "iterations": 10**6, "time_budget": 0.3}).fit(paraboloid())
     assert 1 <= model.report_["iterations"] < 10**4
     assert np.isfinite(model.transform(paraboloid())).all()
+
+
+def test_the_time_that_remains_is_told_by_the_pace_of_the_steps(monkeypatch) -> None:
+    clock = Clock(monkeypatch, pace=0.004)
+    told = []
+
+    def tell(progress) -> None:
+        told.append(round(progress.remaining, 3))
+        clock.now += 0.5  # which is the next step's
+
+    ParaPoint(**{**FAST, "iterations": 10}).fit(paraboloid(700), callback=tell)
+    # The 2.8 s that the map takes are no step's.
+    assert told == [0.0, *(round(0.5 * k / (k + 1) * (9 - k), 3) for k in range(1, 10))]
+    told.clear()
+    clock.now, clock.counts = 100.0, []
+    ParaPoint(**{**FAST, "iterations": 100}, time_budget=2.0).fit(paraboloid(700), callback=tell)
+    assert told[1] == pytest.approx(2.0 - 0.4 - 0.48 - 0.5)  # two maps and a step
 
 
 def test_the_report_and_the_trace_say_what_was_done() -> None:

@@ -570,6 +570,7 @@ def test_pcd(tmp_path, encoding, caplog):
         cloud = cloud_of(tmp_path, "a.pcd", header.encode() + body)
     assert_array_equal(cloud.points[:, 0], [k for k in range(50) if k != 7])
     assert "1 of 50 points dropped" in caplog.text
+    assert cloud.dropped == 1
     fault(tmp_path, "b.pcd", header.encode() + body[: len(body) // 2])
 
 

@@ -24,7 +24,7 @@ def plain(stack: Stack, x: torch.Tensor) -> torch.Tensor:
         ACTIVATIONS["softplus"]: lambda z: torch.nn.functional.softplus(z, 10.0),
     }
     for i, layer in enumerate(stack.layers):
-        x = torch.nn.functional.linear(x, layer[:, :-1], layer[:, -1])
+        x = x @ layer[:-1] + layer[-1]
         if i + 1 < len(stack.layers):
             x = functions[stack.activation](x)
     return x
