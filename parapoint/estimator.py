@@ -521,7 +521,10 @@ class ParaPoint:
                 fault = error
             else:
                 is_whole = time.monotonic() < deadline
-                if first is None or is_whole or _conformality(second[1]) > _conformality(first[1]):
+                if first is None or is_whole:
+                    return second
+                # Of two that are as good as exact the one of more points stays.
+                if _conformality(second[1]) > _conformality(first[1]) - 1e-6:
                     return second
             self._draw(surface, few)
         if first is None:
