@@ -1,10 +1,12 @@
-"""A map of a planar domain to the plane without flips or overlaps, nearly conformal, of even scale.
+"""A nearly conformal map of a planar domain to the plane without flips or overlaps, of even scale.
 
-Tutte's embedding is bijective. From it energies are brought down in turn, with the space around the
-map triangulated too and kept from turning over, so that the boundary never crosses itself (Jiang,
-Schaefer and Panozzo 2017, "Simplicial complex augmentation framework for bijective maps"; libigl
-has it, on J. R. Shewchuk's Triangle). Isometric energies come first: of the many maps that are
-nearly conformal, the descent on the conformal energy then finds one of even scale.
+A planar layout of even scale that does not cover itself is the start. From another one the map goes
+towards it: Tutte's embedding is bijective, and an isometric energy of the map from it to the
+layout, or to the surface where there is no layout, is brought down. Last comes the conformal
+energy: of the many maps that are nearly conformal it then finds one of even scale. In all of this
+the space around the map is triangulated too and kept from turning over, so that the boundary never
+crosses itself (Jiang, Schaefer and Panozzo 2017, "Simplicial complex augmentation framework for
+bijective maps"; libigl has it, on J. R. Shewchuk's Triangle).
 """
 
 from __future__ import annotations
@@ -21,12 +23,14 @@ from scipy.sparse.linalg import splu
 
 from parapoint.surface import FloatArray, IntArray, Mesh, edge_table
 
-DESCENTS = (igl.SYMMETRIC_DIRICHLET, igl.LOG_ARAP, igl.CONFORMAL)
-"""The energies in turn. Near an isometry libigl's first gives no numbers; the second goes on."""
+ISOMETRIC = (igl.SYMMETRIC_DIRICHLET, igl.LOG_ARAP)
+"""The isometric energies in turn. Near an isometry libigl's first gives no numbers; the second goes
+on."""
 LEAST_GAIN = 0.02
 """A descent ends when a step lowers what is left of the energy by less than this share."""
-EXACT = 1e-14
-"""An excess of energy this small is none."""
+CLOSE, EXACT = 5e-4, 1e-14
+"""An excess of energy this small is none: on the way to the layout, which is no goal of its own,
+and of the map."""
 MOST_STEPS = 50
 """Steps of a descent at most."""
 FLATTEST = 1e-22
@@ -37,28 +41,90 @@ class BijectionError(RuntimeError):
     """No bijective map was found; the message says why."""
 
 
-def bijective_map(mesh: Mesh, deadline: float = math.inf) -> FloatArray:
-    """(V, 2) a bijective map of a connected planar domain, faces counter-clockwise.
+def bijective_map(mesh: Mesh, layout: FloatArray | None, deadline: float = math.inf) -> FloatArray:
+    """(V, 2) a nearly conformal bijective map of a connected planar domain.
 
-    No step begins after `deadline`, a time of `time.monotonic`: the map is then as far as it came.
+    Args:
+        mesh: the domain, faces counter-clockwise.
+        layout: (V, 2) a nearly conformal map whose scale is wanted, faces perhaps on one another;
+            None where none is known.
+        deadline: no step begins after this time of `time.monotonic`: the map is then as far as it
+            came.
 
     Raises:
         BijectionError: a face is flat, or in Tutte's embedding too small for numbers.
     """
     size = np.sqrt(mesh.face_areas.sum())
-    mesh = Mesh(mesh.vertices / size, mesh.faces)
+    mesh, start = _embedded(mesh)
+    uv = start
+    flat = None if layout is None else _of_area_one(np.pad(layout, ((0, 0), (0, 1))), mesh.faces)
+    if flat is not None and is_bijective(flat, flat.vertices[:, :2]):
+        uv = flat.vertices[:, :2]
+    elif flat is not None and flat.face_areas.min() > FLATTEST:
+        uv = _descended(flat, uv, igl.SYMMETRIC_DIRICHLET, CLOSE, deadline)
+    else:
+        for energy in ISOMETRIC:
+            uv = _descended(mesh, uv, energy, EXACT, deadline)
+    uv = _descended(mesh, uv, igl.CONFORMAL, EXACT, deadline)
+    if uv is start and time.monotonic() < deadline:
+        raise BijectionError("no step lowers its distortion")
+    return np.asarray(size * uv)
+
+
+def isometric_map(mesh: Mesh) -> FloatArray:
+    """(V, 2) a bijective map of a connected planar domain of small symmetric Dirichlet energy.
+
+    Raises:
+        BijectionError: as of `bijective_map`.
+    """
+    size = np.sqrt(mesh.face_areas.sum())
+    return np.asarray(size * _descended(*_embedded(mesh), igl.SYMMETRIC_DIRICHLET, EXACT))
+
+
+def _embedded(mesh: Mesh) -> tuple[Mesh, FloatArray]:
+    """The mesh and Tutte's embedding (V, 2), both of area 1.
+
+    Raises:
+        BijectionError: as of `bijective_map`.
+    """
+    mesh = _of_area_one(mesh.vertices, mesh.faces)
     if not mesh.face_areas.min() > FLATTEST:
         raise BijectionError("a face has no area")
     uv = tutte(mesh)
     areas = signed_areas(uv, mesh.faces)
     if not (np.isfinite(uv).all() and areas.min() > FLATTEST):
         raise BijectionError("its embedding in the disk has flat triangles")
-    start = uv = uv / np.sqrt(areas.sum())
-    for energy in DESCENTS:
-        uv = _descended(mesh, uv, energy, deadline)
-    if uv is start and time.monotonic() < deadline:
-        raise BijectionError("no step lowers its distortion")
-    return np.asarray(size * uv)
+    return mesh, np.asarray(uv / np.sqrt(areas.sum()))
+
+
+def _of_area_one(vertices: FloatArray, faces: IntArray) -> Mesh:
+    """A mesh scaled so; as it is where it has no area."""
+    area = Mesh(vertices, faces).face_areas.sum()
+    return Mesh(vertices / (np.sqrt(area) or 1.0), faces)
+
+
+def is_bijective(mesh: Mesh, uv: FloatArray) -> bool:
+    """Whether a map (V, 2) of a planar domain is one to one, faces counter-clockwise.
+
+    Where no face is turned over it is if the images of the boundary's edges do not cross.
+    """
+    if not (signed_areas(uv, mesh.faces) > 0).all():
+        return False
+    start = np.concatenate(mesh.boundary_loops)
+    end = np.concatenate([np.roll(loop, -1) for loop in mesh.boundary_loops])
+    low, high = np.minimum(uv[start], uv[end]), np.maximum(uv[start], uv[end])
+    meets = ((low[:, None] <= high) & (low <= high[:, None])).all(axis=2)
+    one, other = np.nonzero(np.triu(meets, 1))
+    apart = (start[one] != end[other]) & (end[one] != start[other])
+    ends = start[one], end[one], start[other], end[other]
+    a, b, c, d = (uv[rows[apart]] for rows in ends)
+    return not ((_side(a, b, c) != _side(a, b, d)) & (_side(c, d, a) != _side(c, d, b))).any()
+
+
+def _side(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
+    """(n,) on which side of the line from a to b the point c is: 1 left, -1 right, 0 on it."""
+    first, second = b - a, c - a
+    return np.asarray(np.sign(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]))
 
 
 def tutte(mesh: Mesh) -> FloatArray:
@@ -97,9 +163,13 @@ def signed_areas(uv: FloatArray, faces: IntArray) -> FloatArray:
 
 
 def _descended(
-    mesh: Mesh, uv: FloatArray, energy: igl.MappingEnergyType, deadline: float
+    mesh: Mesh,
+    uv: FloatArray,
+    energy: igl.MappingEnergyType,
+    least: float,
+    deadline: float = math.inf,
 ) -> FloatArray:
-    """(V, 2) the bijective map `uv` (V, 2) moved down an energy."""
+    """(V, 2) the bijective map `uv` (V, 2) moved down an energy by steps that gain `least`."""
     state = triangle.SCAFData()
     triangle.scaf_precompute(
         np.asfortranarray(mesh.vertices),
@@ -119,7 +189,7 @@ def _descended(
         if not (signed_areas(moved, mesh.faces) > 0).all():  # nor if not a number
             break
         uv, after = moved, _excess(mesh, moved, energy)
-        if not before - after > LEAST_GAIN * after + EXACT:
+        if not before - after > LEAST_GAIN * after + least:
             break
         before = after
     return uv

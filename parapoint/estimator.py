@@ -25,6 +25,7 @@ from torch import Tensor
 from parapoint.anchored import AnchoredNetworks, Anchors
 from parapoint.charts import Chart, Charts
 from parapoint.components import components
+from parapoint.denoising import denoised
 from parapoint.errors import InputError
 from parapoint.flattening import FlatMap, flat_map
 from parapoint.losses import DISTORTIONS, EIGENVALUES
@@ -448,6 +449,7 @@ class ParaPoint:
     ) -> tuple[SubNetworks | None, dict[str, object]]:
         """Networks that hold a computed map of the surface, and what the report says of it.
 
+        The map of a noisy point is that of the place on the surface where it belongs.
         Where none can be computed they are None, and `preset_` becomes the one that trains.
 
         Args:
@@ -490,7 +492,9 @@ class ParaPoint:
         cloud = self._framed()
         _, rows = np.unique(np.round(cloud / COINCIDENT), axis=0, return_index=True)
         cloud = cloud[np.sort(rows)]
-        return cloud, flat_map(cloud, deadline)
+        still = denoised(cloud)
+        flat = flat_map(still, deadline)
+        return cloud, flat._replace(facts={**flat.facts, "denoised": still is not cloud})
 
     def _flat_map_within(
         self, surface: Surface, few: int, deadline: float
@@ -517,7 +521,10 @@ class ParaPoint:
                 fault = error
             else:
                 is_whole = time.monotonic() < deadline
-                if first is None or is_whole or _conformality(second[1]) > _conformality(first[1]):
+                if first is None or is_whole:
+                    return second
+                # Of two that are as good as exact the one of more points stays.
+                if _conformality(second[1]) > _conformality(first[1]) - 1e-6:
                     return second
             self._draw(surface, few)
         if first is None:

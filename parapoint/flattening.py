@@ -2,7 +2,8 @@
 
 The cloud is triangulated, cut, and flattened by a bijective map. The cuts lead to where the scale
 of a conformal map, found by a linear solve, is most extreme (as in Sawhney and Crane 2017,
-"Boundary first flattening", section 6), and are as long as an even scale needs.
+"Boundary first flattening", section 6), and are as long as an even scale needs. The map is laid out
+by that scale (`parapoint.layout`), then made bijective (`parapoint.bijection`).
 """
 
 from __future__ import annotations
@@ -10,14 +11,15 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-import igl
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from parapoint.bijection import bijective_map, factored, signed_areas
+from parapoint.bijection import bijective_map, signed_areas
 from parapoint.cutting import cut_along, cut_to_disk
+from parapoint.layout import scaled_layout
 from parapoint.reconstruction import ReconstructionError, triangulation
+from parapoint.scale import area_discrepancy, even_scale, log_scale, mapped_areas, turning
 from parapoint.surface import FloatArray, IntArray, Mesh
 
 AREA_DISCREPANCY = 0.6
@@ -26,8 +28,6 @@ OPEN_SEAM, CLOSED_SEAM = 0.022, 0.037
 """Most seam edges, as a fraction of the faces, on surfaces with and without boundary."""
 TIPS = 3
 """Extremal points that are tried as the tip of each cut."""
-COTANGENTS = (0.02, 20.0)
-"""Range of the edge weights of a Laplacian: positive, for the maximum principle."""
 LONELY = 6.0
 """Cost of a vertex most of whose edges cross the seam, in such edges' share."""
 SWEEPS = 10
@@ -72,7 +72,7 @@ def flat_map(points: FloatArray, deadline: float = math.inf) -> FlatMap:
     mesh = Mesh(points[reached], row[mesh.faces])
     try:
         disk = _seamed(mesh)
-        uv = bijective_map(disk, deadline)
+        uv = bijective_map(disk, _layout(disk), deadline)
     except (RuntimeError, np.linalg.LinAlgError) as error:  # a singular factor, no bijection
         raise ReconstructionError(f"the triangulation has no flat map ({error})") from None
     uv -= (uv.max(axis=0) + uv.min(axis=0)) / 2
@@ -99,6 +99,16 @@ def _seamed(mesh: Mesh) -> Mesh:
         opened = cut_to_disk(mesh)
     opened = _joined_loops(opened)
     return _scale_cuts(opened, budget - (len(opened.vertices) - len(mesh.vertices)))
+
+
+def _layout(disk: Mesh) -> FloatArray | None:
+    """(V, 2) a map of even scale, faces perhaps on one another; None where there are holes.
+
+    Around a hole the frames come back turned by a full turn, but not to the same place.
+    """
+    if len(disk.boundary_loops) > 1:
+        return None
+    return scaled_layout(disk, even_scale(disk))
 
 
 def _origin(mesh: Mesh, cut: Mesh) -> IntArray:
@@ -131,9 +141,9 @@ def _joined_loops(mesh: Mesh) -> Mesh:
     tube, is joined to the nearest other loop.
     """
     while len(loops := mesh.boundary_loops) > 1:
-        turning = _turning(mesh, _log_scale(mesh, flat_loops=False))
-        wrong = np.abs(turning + 2 * np.pi)
-        wrong[turning.argmax()] = 0
+        turns = turning(mesh, log_scale(mesh, flat_loops=False))
+        wrong = np.abs(turns + 2 * np.pi)
+        wrong[turns.argmax()] = 0
         worst = int(wrong.argmax())
         if wrong[worst] < np.pi:
             break
@@ -148,11 +158,12 @@ def _joined_loops(mesh: Mesh) -> Mesh:
 def _scale_cuts(mesh: Mesh, budget: int) -> Mesh:
     """The planar domain cut from its boundary to where the scale is most extreme.
 
-    Of some tips the one with the largest gain for each cut edge is taken, until the area
-    discrepancy is small enough or `budget` edges are cut.
+    Extreme is what is far from the boundary and in its log scale from the mean area's. Of some such
+    tips the one with the largest gain for each cut edge is taken, until the area discrepancy is
+    small enough or `budget` edges are cut.
     """
-    scale = _log_scale(mesh)
-    discrepancy = _area_discrepancy(mesh, scale)
+    scale, area = log_scale(mesh), mesh.face_areas.sum()
+    discrepancy = area_discrepancy(mesh, scale)
     while discrepancy > AREA_DISCREPANCY:
         graph = _graph(mesh)
         distance, previous, _ = csgraph.dijkstra(
@@ -161,17 +172,18 @@ def _scale_cuts(mesh: Mesh, budget: int) -> Mesh:
             return_predecessors=True,
             min_only=True,
         )
+        extreme = distance * np.abs(scale - np.log(mapped_areas(mesh, scale).sum() / area) / 2)
         candidates = []
         blocked = np.zeros(len(scale), dtype=bool)
         for _ in range(TIPS):
-            tip = int(np.where(blocked, -1.0, np.abs(scale)).argmax())
+            tip = int(np.where(blocked, -1.0, extreme).argmax())
             blocked |= np.isfinite(csgraph.dijkstra(graph, indices=tip, limit=distance[tip] / 2))
             path = _path(previous, tip)
             if not 0 < len(path) <= budget:
                 continue
             cut = cut_along(mesh, path)
-            new_scale = _log_scale(cut)
-            new_discrepancy = _area_discrepancy(cut, new_scale)
+            new_scale = log_scale(cut)
+            new_discrepancy = area_discrepancy(cut, new_scale)
             gain = (discrepancy - new_discrepancy) / len(path)
             candidates.append((gain, len(path), cut, new_scale, new_discrepancy))
         if not candidates:
@@ -181,73 +193,6 @@ def _scale_cuts(mesh: Mesh, budget: int) -> Mesh:
             break
         mesh, scale, discrepancy, budget = cut, new_scale, new_discrepancy, budget - length
     return mesh
-
-
-def _laplacian(mesh: Mesh) -> sparse.csc_matrix:
-    """(V, V) positive cotangent Laplacian, its edge weights kept within COTANGENTS."""
-    rows, columns, halves = [], [], []
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        at, left, right = (mesh.faces[:, n] for n in (i, j, k))
-        a, b = (mesh.vertices[end] - mesh.vertices[at] for end in (left, right))
-        area = np.linalg.norm(np.cross(a, b), axis=1)
-        cotangent = np.clip((a * b).sum(axis=1) / np.maximum(area, 1e-300), -1e6, 1e6)
-        rows += [left, right]
-        columns += [right, left]
-        halves += [cotangent / 2] * 2
-    entries = np.concatenate(halves), (np.concatenate(rows), np.concatenate(columns))
-    weight = sparse.coo_matrix(entries, (len(mesh.vertices),) * 2).tocsc()
-    weight.data = np.clip(weight.data, *COTANGENTS)
-    return (sparse.diags_array(np.asarray(weight.sum(axis=1)).reshape(-1)) - weight).tocsc()
-
-
-def _curvature(mesh: Mesh) -> FloatArray:
-    """(V,) angle defect at inner vertices, turning angle at those of the boundary."""
-    angles = igl.internal_angles(mesh.vertices, mesh.faces)
-    total = np.bincount(mesh.faces.reshape(-1), np.nan_to_num(angles).reshape(-1))
-    flat = np.full(len(total), 2 * np.pi)
-    flat[np.concatenate(mesh.boundary_loops)] = np.pi
-    return np.asarray(flat - total)
-
-
-def _turning(mesh: Mesh, scale: FloatArray) -> FloatArray:
-    """(loops,) angle by which each boundary loop turns in the metric of a log scale (V,)."""
-    bend = _curvature(mesh) + _laplacian(mesh) @ scale
-    return np.array([bend[loop].sum() for loop in mesh.boundary_loops])
-
-
-def _log_scale(mesh: Mesh, *, flat_loops: bool = True) -> FloatArray:
-    """(V,) log scale of the conformal map of a planar domain that distorts area least.
-
-    It solves Δu = −(angle defect), with u = 0 on the boundary (Springborn, Schröder and Pinkall
-    2008, section 5). With `flat_loops` it is a constant on each inner loop instead, such that the
-    loop turns by −2π, as in the plane.
-    """
-    loops = mesh.boundary_loops
-    boundary = np.concatenate(loops)
-    inside = np.setdiff1d(np.arange(len(mesh.vertices)), boundary)
-    scale = np.zeros(len(mesh.vertices))
-    if len(inside) == 0:
-        return scale
-    matrix = _laplacian(mesh)
-    factor = factored(matrix[inside][:, inside])
-    scale[inside] = factor.solve(-_curvature(mesh)[inside])
-    if not flat_loops or len(loops) == 1:
-        return scale
-    turning = _turning(mesh, scale)
-    inner = np.delete(np.arange(len(loops)), turning.argmax())
-    unit = np.zeros((len(scale), len(inner)))
-    for column, loop in enumerate(inner):
-        unit[loops[loop], column] = 1
-    unit[inside] = factor.solve(-(matrix[inside][:, boundary] @ unit[boundary]))
-    flux = matrix @ unit
-    response = np.array([flux[loops[loop]].sum(axis=0) for loop in inner])
-    return np.asarray(scale + unit @ np.linalg.solve(response, -2 * np.pi - turning[inner]))
-
-
-def _area_discrepancy(mesh: Mesh, scale: FloatArray) -> float:
-    """Σ |share of the mapped area − share of the area| over the faces, predicted from the scale."""
-    mapped = mesh.face_areas * np.exp(2 * np.clip(scale[mesh.faces].mean(axis=1), -30, 30))
-    return float(np.abs(mapped / mapped.sum() - mesh.face_areas / mesh.face_areas.sum()).sum())
 
 
 def _vertex_jacobians(mesh: Mesh, uv: FloatArray) -> FloatArray:

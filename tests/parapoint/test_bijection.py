@@ -4,7 +4,7 @@ import pytest
 
 from benchmarks.metrics import evaluate
 from parapoint import bijection
-from parapoint.bijection import BijectionError, bijective_map, tutte
+from parapoint.bijection import BijectionError, bijective_map, is_bijective, signed_areas, tutte
 from parapoint.parameterization import Parameterization
 from parapoint.surface import Mesh
 
@@ -43,7 +43,7 @@ def test_a_surface_that_would_cover_itself_does_not() -> None:
     pins = loop[[0, len(loop) // 2]]
     linear = igl.lscm(mesh.vertices, mesh.faces, pins, np.array([[0.0, 0.0], [1.0, 0.0]]))[0]
     assert score(mesh, linear)["overlap_area"] > 0.1
-    found = score(mesh, bijective_map(mesh))
+    found = score(mesh, bijective_map(mesh, linear))
     start = score(mesh, tutte(mesh))
     assert found["bijective"] == 1
     assert found["angle_difference_mean"] < start["angle_difference_mean"] / 3
@@ -52,27 +52,57 @@ def test_a_surface_that_would_cover_itself_does_not() -> None:
 def test_a_hole_stays_open_and_a_flat_surface_as_it_is() -> None:
     mesh = ring()
     assert len(mesh.boundary_loops) == 2
-    found = score(mesh, bijective_map(mesh))
+    found = score(mesh, bijective_map(mesh, mesh.vertices[:, :2]))
     assert found["bijective"] == 1
     assert found["angle_difference_max"] < 1e-4
     assert found["area_discrepancy_total"] < 1e-4
 
 
+def test_of_the_conformal_maps_it_finds_one_near_the_layout() -> None:
+    mesh = ring()
+    images = mesh.vertices[:, 0] + 1j * mesh.vertices[:, 1]
+    images = np.exp(images / 8)  # conformal, of scales 1 to 4.5
+    layout = np.stack([images.real, images.imag], axis=1)
+    found = bijective_map(mesh, layout)
+    area, wanted = (np.abs(signed_areas(of, mesh.faces)) for of in (found, layout))
+    assert np.abs(area / area.sum() / (wanted / wanted.sum()) - 1).max() < 0.2
+
+
+def test_a_layout_of_flat_triangles_is_no_guide() -> None:
+    mesh = ring()
+    found = score(mesh, bijective_map(mesh, np.zeros((len(mesh.vertices), 2))))
+    assert found["bijective"] == 1
+    assert found["angle_difference_max"] < 0.05
+
+
+def test_a_crossing_or_turned_map_is_not_bijective() -> None:
+    mesh = ramp()
+    loop = mesh.boundary_loops[0]
+    pins = loop[[0, len(loop) // 2]]
+    covering = igl.lscm(mesh.vertices, mesh.faces, pins, np.array([[0.0, 0.0], [1.0, 0.0]]))[0]
+    assert (signed_areas(covering, mesh.faces) > 0).all()
+    assert not is_bijective(mesh, covering)
+    assert is_bijective(mesh, tutte(mesh))
+    assert not is_bijective(mesh, tutte(mesh)[:, ::-1])
+
+
 def test_a_face_without_area_is_refused() -> None:
     points = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 1, 0]])
     with pytest.raises(BijectionError, match="no area"):
-        bijective_map(Mesh(points, np.array([[0, 1, 2], [0, 2, 3]])))
+        bijective_map(Mesh(points, np.array([[0, 1, 2], [0, 2, 3]])), points[:, :2])
 
 
 def test_the_descents_end_with_the_time_and_leave_what_they_have(monkeypatch) -> None:
     mesh = ramp()
-    whole = bijective_map(mesh)
+    whole = bijective_map(mesh, None)
     steps = iter(range(1000))
     monkeypatch.setattr(bijection.time, "monotonic", lambda: float(next(steps)))
-    some = bijective_map(mesh, deadline=4.5)  # five steps of the first descent, none of the others
+    some = bijective_map(
+        mesh, None, deadline=4.5
+    )  # five steps of the first descent, none of the others
     assert score(mesh, some)["bijective"] == 1
     start, end = (score(mesh, uv)["angle_difference_mean"] for uv in (tutte(mesh), whole))
     assert end < score(mesh, some)["angle_difference_mean"] < start
-    none = bijective_map(mesh, deadline=0.0)
+    none = bijective_map(mesh, None, deadline=0.0)
     size = np.sqrt(mesh.face_areas.sum() / igl.doublearea(tutte(mesh), mesh.faces).sum() * 2)
     np.testing.assert_allclose(none, size * tutte(mesh))
