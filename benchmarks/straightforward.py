@@ -47,7 +47,8 @@ class Reached(NamedTuple):
 def race(case: str, seconds: float, *, seed: int = 0) -> Iterator[Reached]:
     """What `fast` and `smooth` reach on a mesh, and the straightforward way at 1, 2, 4, ... steps.
 
-    `fast` takes what it takes, the others `seconds` of processor time each.
+    `fast` takes what it takes, `smooth` has `seconds` by the clock, the straightforward one
+    `seconds` of processor time.
 
     Raises:
         InputError: there is no such model, or it is no mesh.
