@@ -25,7 +25,6 @@ from torch import Tensor
 from parapoint.anchored import AnchoredNetworks, Anchors
 from parapoint.charts import Chart, Charts
 from parapoint.components import components
-from parapoint.denoising import denoised
 from parapoint.errors import InputError
 from parapoint.flattening import FlatMap, flat_map
 from parapoint.losses import DISTORTIONS, EIGENVALUES
@@ -492,9 +491,7 @@ class ParaPoint:
         cloud = self._framed()
         _, rows = np.unique(np.round(cloud / COINCIDENT), axis=0, return_index=True)
         cloud = cloud[np.sort(rows)]
-        still = denoised(cloud)
-        flat = flat_map(still, deadline)
-        return cloud, flat._replace(facts={**flat.facts, "denoised": still is not cloud})
+        return cloud, flat_map(cloud, deadline)
 
     def _flat_map_within(
         self, surface: Surface, few: int, deadline: float

@@ -66,7 +66,7 @@ def triangulation(points: FloatArray) -> Mesh:
     if between.any():
         args = points, outward[between], radius[between], BEND_COSTS[-1]
         fronts.append(_Front(*args, is_oriented=True))
-    return min((_largest_part(points, front.grown()) for front in fronts), key=_defects)
+    return min((_largest_part(points, front.grown()) for front in fronts), key=defects)
 
 
 class _Front:
@@ -249,8 +249,8 @@ def _filled(points: FloatArray, faces: IntArray, loops: list[IntArray]) -> IntAr
     return np.concatenate([faces, np.array(ears, dtype=np.int64).reshape(-1, 3)])
 
 
-def _defects(mesh: Mesh) -> int:
-    """What a triangulation has of handles, boundary edges, folds and unused points."""
+def defects(mesh: Mesh) -> int:
+    """What a triangulation has of handles, boundary edges, folds and unused points, as a count."""
     boundary = int((mesh.edge_face_count == 1).sum())
     return HANDLE * mesh.genus + boundary + _folds(mesh) + int((~mesh.referenced).sum())
 

@@ -2,6 +2,7 @@ import numpy as np
 
 from benchmarks.builtin import sphere, torus
 from parapoint.denoising import denoised, noise
+from parapoint.flattening import flat_map
 from parapoint.surface import FloatArray
 
 
@@ -40,3 +41,17 @@ def test_a_point_goes_along_the_normal_alone() -> None:
     moved = np.abs(still - points)[inner]
     assert np.sqrt((still[inner, 2] ** 2).mean()) < 0.4 * np.sqrt((points[inner, 2] ** 2).mean())
     assert np.median(moved[:, :2]) < 0.2 * np.median(moved[:, 2])
+
+
+def test_a_map_is_of_denoised_points_where_these_have_fewer_defects() -> None:
+    assert flat_map(ball(1500, 0.03)).facts["denoised"]
+    assert not flat_map(ball(1500, 0)).facts["denoised"]
+
+
+def test_thin_sheets_that_look_like_noise_stay_apart() -> None:
+    side = np.random.default_rng(0).uniform(-1, 1, (1500, 2))
+    side = side[(side**2).sum(axis=1) < 1]
+    rim = np.sqrt(1 - (side**2).sum(axis=1))
+    points = np.column_stack([side, 0.06 * rim * np.where(np.arange(len(side)) % 2, 1, -1)])
+    assert noise(points) > 0.2
+    assert not flat_map(points).facts["denoised"]
