@@ -138,7 +138,7 @@ def disks(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure | 
             row = contents.shown(case, label)
             if row is not None:
                 lines.append(f"{label.name}\n{values_text(contents, row)}")
-        rows.append((wrapped(case), "\n".join(lines), found))
+        rows.append((wrapped(case, 26), "\n".join(lines), found))
     side = (WIDTH - 1.5) / 3 if len(chosen) == 1 else 1.05
     return picture_grid(heads, rows, side=side, left=1.5)
 
