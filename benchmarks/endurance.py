@@ -4,6 +4,9 @@
 that had been reported done is lost, none is damaged, and each table that comes of it is the one of
 a run that was never disturbed.
 
+`faults`: methods that crash, hang, fork, print and eat memory, among instant ones. Each costs its
+own cell: a row with its reason; the others have the maps of a run in which nothing went wrong.
+
 `scale`: runs of an instant method. What the harness costs a cell, whether that grows with the
 number of cells, how large the store becomes, how long a finished run takes to say so.
 
@@ -12,6 +15,7 @@ number of cells, how large the store becomes, how long a finished run takes to s
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import random
 import shutil
@@ -25,9 +29,10 @@ from typing import Any
 
 import click
 import numpy as np
+import psutil
 
 from baselines import registry
-from benchmarks import instant, runner
+from benchmarks import faulty, instant, runner
 from benchmarks.results import Store
 from benchmarks.suites import Suite
 from parapoint import console
@@ -169,6 +174,33 @@ def _table(store: Store) -> list[dict[str, Any]]:
     ]
 
 
+def saved(models: Path, out: Path, seeds: int) -> Toll:
+    """Run methods that go wrong among instant ones: each costs its own cell, and nothing else."""
+    instants = instant_suite(models, models=2, methods=2, seeds=seeds)
+    wrong = tuple(f"faulty(fault={fault})" for fault in faulty.FAULTS)
+    mixed = dataclasses.replace(instants, methods=(*wrong, *instants.methods))
+    found = Toll()
+    runner.run(instants, out / "alone", plugins=[PLUGIN])
+    plugins = [PLUGIN, f"{faulty.__file__}:Faulty"]
+    runner.run(mixed, out / "mixed", plugins=plugins, jobs=2, timeout=2.0, memory=0.5)
+    store = Store(out / "mixed")
+    for fault in store.faults():
+        found.fault(fault)
+    rows = store.rows()
+    for row in rows:
+        if row.method == "faulty":
+            expected = faulty.FAULTS[str(row.params["fault"])][1]
+            if row.status != expected or not row.reason:
+                found.fault(f"{row.cell}: {row.status} ({row.reason}) in place of {expected}")
+    well = {row.cell: row.uv_sha256 for row in rows if row.method == "instant"}
+    if well != {row.cell: row.uv_sha256 for row in Store(out / "alone").rows()}:
+        found.fault("other maps than those of a run in which nothing went wrong")
+    found.reported = len(rows)
+    for process in psutil.Process().children(recursive=True):
+        found.fault(f"process {process.pid} is left")
+    return found
+
+
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 def main() -> None:
     """Kill runs, and measure what the harness costs."""
@@ -188,6 +220,18 @@ def kills(ctx: click.Context, count: int, seed: int) -> None:
         f"{found.kills} kills in {time.monotonic() - began:.0f} s, {found.reported} rows had been "
         f"reported, {found.tables} runs came to their end: {found.faults or 'no'} faults"
     )
+    if found.faults:
+        ctx.exit(1)
+
+
+@main.command()
+@click.option("--seeds", type=click.IntRange(1), default=20, show_default=True)
+@click.pass_context
+def faults(ctx: click.Context, seeds: int) -> None:
+    """Let methods crash, hang, fork and eat memory, and see what that costs the others."""
+    with tempfile.TemporaryDirectory() as name:
+        found = saved(Path(name) / "models", Path(name), seeds)
+    print(f"{found.reported} cells: {found.faults or 'no'} faults")
     if found.faults:
         ctx.exit(1)
 

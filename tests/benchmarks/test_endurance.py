@@ -1,18 +1,18 @@
-"""A short form of `python -m benchmarks.endurance kills`: runs that are killed lose nothing."""
+"""Short forms of `python -m benchmarks.endurance`: kills and faults cost no row."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
 
-from benchmarks import endurance
+from benchmarks import endurance, faulty
 from benchmarks.environment import ROOT
 from benchmarks.results import ResultRow, Store, identity
 
 KILLS = """
 import sys
 from pathlib import Path
-from benchmarks import endurance
+from benchmarks import endurance, faulty
 folder = Path(sys.argv[1])
 suite = endurance.instant_suite(folder / "models", models=2, methods=1, seeds=2)
 print(endurance.toll(suite, folder, count=2, seed=1))
@@ -50,3 +50,13 @@ def test_a_row_that_is_lost_or_damaged_is_a_fault(tmp_path, capsys):
     endurance._check(store, set(), found)
     assert "line 1: no whole row" in capsys.readouterr().out
     assert found.faults == 2
+
+
+def test_methods_that_go_wrong_cost_their_own_cells(tmp_path, monkeypatch, capsys):
+    faults = {name: faulty.FAULTS[name] for name in ("segfault", "breed", "kill_the_supervisor")}
+    monkeypatch.setattr(faulty, "FAULTS", faults)
+    found = endurance.saved(tmp_path / "models", tmp_path / "one", 1)
+    assert (found.reported, found.faults) == (2 * (3 + 2), 0)
+    monkeypatch.setattr(faulty, "FAULTS", {"quit": (lambda: None, "timeout")})
+    assert endurance.saved(tmp_path / "models", tmp_path / "two", 1).faults == 2
+    assert "in place of timeout" in capsys.readouterr().out
