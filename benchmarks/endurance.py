@@ -196,8 +196,9 @@ def saved(models: Path, out: Path, seeds: int) -> Toll:
     if well != {row.cell: row.uv_sha256 for row in Store(out / "alone").rows()}:
         found.fault("other maps than those of a run in which nothing went wrong")
     found.reported = len(rows)
-    for process in psutil.Process().children(recursive=True):
-        found.fault(f"process {process.pid} is left")
+    for process in psutil.process_iter(["cwd"]):  # by where it is: its parent may be gone
+        if (process.info["cwd"] or "").startswith(str(out.resolve())):
+            found.fault(f"process {process.pid} is left")
     return found
 
 
