@@ -81,8 +81,11 @@ def images(
     sparse, dense = surface_points(mesh, SPARSE), surface_points(mesh, DENSE)
     spacing = float(np.sqrt(mesh.face_areas.sum() / SPARSE))
     seen = view.at_corners(mesh.vertices[mesh.faces])
-    distance, nearest = cKDTree(sparse.positions).query(seen, workers=-1)
-    dots = distance < DOT * spacing
+    reach = DOT * spacing
+    distance, nearest = cKDTree(sparse.positions).query(
+        seen, distance_upper_bound=reach, workers=-1
+    )
+    dots = np.isfinite(distance)
     tones = sparse.at(colours).astype(np.float32)
     _, densely = cKDTree(dense.positions).query(seen, workers=-1)
     field = np.floor(dense.uv(uv, spanning) * squares).sum(axis=1) % 2 == 0
@@ -206,8 +209,8 @@ def _seams(view: View, seam: FloatArray, dots: BoolArray, seen: Floats, spacing:
     """Grey dots, and green ones over them at the points `seam` (m, 3)."""
     green = np.zeros(len(seen), dtype=np.bool_)
     if len(seam):
-        distance, _ = cKDTree(seam).query(seen, workers=-1)
-        green = distance < SEAM_DOT * spacing
+        distance, _ = cKDTree(seam).query(seen, distance_upper_bound=SEAM_DOT * spacing, workers=-1)
+        green = np.isfinite(distance)
     kept = dots | green
     colours = np.where(green[kept, None], render.SEAM_GREEN, GREY)
     return _part(view, kept).image(colours.astype(np.float32))

@@ -15,10 +15,13 @@ from dataclasses import dataclass
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
+from typing import IO
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 from PIL import Image as Images
+from pypdf import PdfWriter
 
 from benchmarks.results import ResultRow
 from reports.clouds import DENSE, SPARSE
@@ -37,7 +40,7 @@ from reports.galleries import (
 from reports.pictures import SHEETS, known_keys, slug, source_hash
 from reports.plots import area_convergence, convergence, cost, losses, pareto, singular_values
 from reports.published import published_values
-from reports.style import STYLE, lighten
+from reports.style import STYLE
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,9 @@ class Drawing:
     rows: tuple[ResultRow, ...]
     figure: Callable[[], Figure | None]
 
+
+JPEG_QUALITY = 85
+"""Of pictures in a PDF."""
 
 MODELS, ROWS, PANELS = 12, 7, 9
 """Models on a page of models, of rows of pictures, of plots."""
@@ -313,10 +319,24 @@ def write(folder: Path, coarse: bool, drawing: Drawing) -> None:
         made.savefig(content, format="png")
         with Images.open(content) as image:
             whole = image.convert("RGB")
-            colours = whole.quantize(256)
+            colours = whole.quantize(256, method=Images.Quantize.FASTOCTREE)
             levels = colours.getpalette() or []
             colours.putpalette([255 if level > 247 else level for level in levels])  # white paper
             few = whole.quantize(palette=colours, dither=Images.Dither.FLOYDSTEINBERG)
             few.save(files[1], optimize=True, dpi=image.info["dpi"])
-        lighten(made)
-        made.savefig(files[0], metadata={"CreationDate": None, "Title": drawing.title})
+        for shown in made.findobj(AxesImage):
+            shown.set_interpolation("none")  # as it is, at the size it is printed
+        content = io.BytesIO()
+        made.savefig(content, format="pdf", metadata={"CreationDate": None, "Title": drawing.title})
+        files[0].write_bytes(light(content))
+
+
+def light(document: IO[bytes]) -> bytes:
+    """A PDF with its pictures as JPEG, which matplotlib cannot write: a fourth of the bytes."""
+    made = PdfWriter(clone_from=document)
+    for page in made.pages:
+        for picture in page.images:
+            picture.replace(picture.image, quality=JPEG_QUALITY, optimize=True)
+    content = io.BytesIO()
+    made.write(content)
+    return content.getvalue()

@@ -24,6 +24,7 @@ from PIL import Image as Images
 from benchmarks.distortion import FaceDistortion
 from benchmarks.metrics import MapState
 from benchmarks.results import ResultRow, Store
+from benchmarks.seams import spanning_edges
 from parapoint.errors import InputError
 from parapoint.parameterization import Parameterization
 from parapoint.surface import BoolArray, FloatArray, Mesh, PointCloud, edge_table
@@ -34,8 +35,10 @@ from reports.render import Camera, Floats, Image, Scene, View
 Content = Image | viewer.Script
 """What is in a file beside the pictures: one of them, or what the viewer reads."""
 
-SIZE, SAMPLES = 360, 2
-"""Longer side of a picture in pixels (what the largest figure prints), samples along a pixel."""
+SIZE, SMALL, SAMPLES = 360, 280, 2
+"""Longer side of a picture in pixels: what the largest figure of a model prints, and enough for the
+others, of suites with too many models for such figures; samples along a pixel.
+"""
 
 FIELDS = 44
 """Fields of the checkerboard along the diagonal of a model's bounding box."""
@@ -75,10 +78,15 @@ class Map:
         """Whether any face has an area in the plane: else there is nothing to see."""
         return bool((self._state.triangles.uv_area != 0).any())
 
-    @property
+    @cached_property
     def spanning(self) -> BoolArray:
-        """(F,) faces that span a learned seam."""
-        return self._state.spanning
+        """(F,) faces that span a learned seam; without a spanning edge there are none.
+
+        Most maps have none: their overlaps, a fourth of the time of their pictures, are not needed.
+        """
+        if spanning_edges(self.mesh, self.parameterization).any():
+            return self._state.spanning
+        return np.zeros(len(self.mesh.faces), dtype=np.bool_)
 
     @cached_property
     def flipped(self) -> BoolArray:
@@ -88,7 +96,8 @@ class Map:
     @property
     def distortion(self) -> FaceDistortion:
         """Of the faces that do not span a seam."""
-        return self._state.distortion_without_spanning
+        state = self._state
+        return state.distortion_without_spanning if self.spanning.any() else state.distortion
 
     @cached_property
     def uv(self) -> FloatArray:
@@ -169,7 +178,8 @@ def meshed(view: View) -> Image:
 class Layout:
     """The map in the plane. Faces that span a seam lie below the others, pale."""
 
-    def __init__(self, found: Map) -> None:
+    def __init__(self, found: Map, size: int) -> None:
+        """The layout of `found`, its longer side of `size` pixels."""
         low = 1e-3 * float(np.ptp(found.uv, axis=(0, 1)).max() or 1)
         height = np.where(found.spanning, -low, np.where(found.flipped, low, 0.0))
         corners = np.concatenate(
@@ -178,7 +188,7 @@ class Layout:
         flat = Mesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
         camera: Camera = render.camera(flat, np.eye(3)[2], np.eye(3)[1])
         self._map = found
-        self._view = Scene(flat, shadows=False).view(camera, SIZE, SAMPLES)
+        self._view = Scene(flat, shadows=False).view(camera, size, SAMPLES)
         self._outline = self._view.near_lines(_outline(found), 1.6)
 
     def image(self, colours: Floats) -> Image:
@@ -295,7 +305,7 @@ def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
                 files = (map_file(row, kind) for kind in own)
                 wanted |= dict.fromkeys(files, (row, row.uv_sha256))
         for name, (row, content) in wanted.items():
-            text = f"{source} {row.surface_hash} {content}"
+            text = f"{source} {with_heat} {row.surface_hash} {content}"
             keys[name] = hashlib.sha256(text.encode()).hexdigest()[:16]
             if known.get(name) != keys[name] or not (folder / name).exists():
                 missing.append(name)
@@ -365,10 +375,11 @@ def draw_model(
         everything += [name for row in rows for name in files_of(row, points=False)]
         return everything, [f"{case}: no pictures: {error}"]
     points = isinstance(surface, PointCloud)
+    size = SIZE if with_heat else SMALL
     subject = (
-        clouds.Portrait(surface, SIZE, SAMPLES, FIELDS)
+        clouds.Portrait(surface, size, SAMPLES, FIELDS)
         if isinstance(surface, PointCloud)
-        else Portrait(surface)
+        else Portrait(surface, size)
     )
     for kind, content in subject.model().items():
         save(content, folder / model_file(case, kind))
@@ -397,11 +408,13 @@ def draw_model(
 class Portrait:
     """A mesh, ready to be drawn under any map."""
 
-    def __init__(self, mesh: Mesh) -> None:
+    def __init__(self, mesh: Mesh, size: int) -> None:
+        """Pictures of `size` pixels."""
         self.mesh = mesh
+        self._size = size
         self._scene = Scene(mesh)
         cameras = render.two_cameras(self._scene)
-        self._views = [self._scene.view(camera, SIZE, SAMPLES) for camera in cameras]
+        self._views = [self._scene.view(camera, size, SAMPLES) for camera in cameras]
 
     def model(self) -> Mapping[str, Content]:
         """The files of the mesh itself by their kind."""
@@ -423,7 +436,7 @@ class Portrait:
         if not found.has_area:
             raise InputError("the map has no area")
         first, second = self._views
-        layout = Layout(found)
+        layout = Layout(found, self._size)
         colours = normal_colours(self._scene, first.camera)
 
         makers: dict[str, Callable[[], Content]] = {

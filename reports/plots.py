@@ -14,13 +14,13 @@ from benchmarks.distortion import (
     face_distortion,
     triangles,
 )
-from benchmarks.metrics import MapState
 from benchmarks.results import ResultRow
 from parapoint.errors import InputError
 from parapoint.parameterization import Parameterization
 from parapoint.surface import FloatArray
 from reports.contents import ANGLE, AREA, Contents, Label
 from reports.galleries import leading
+from reports.pictures import Map
 from reports.style import COLOURS, DASHES, legend_below, look, plain_log, small_multiples, wrapped
 
 
@@ -222,7 +222,7 @@ def singular_value_shares(
     mapped = contents.mapped(row)
     if mapped is None:
         return None
-    found = MapState(*mapped).distortion_without_spanning
+    found = Map(*mapped).distortion
     shares = []
     for sigma in (found.sigma1, found.sigma2):
         known = found.finite & (sigma > 0)

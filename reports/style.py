@@ -8,12 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.image import AxesImage
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from PIL import Image as Images
 
@@ -85,23 +83,6 @@ def put(place: Axes, path: Path) -> None:
             place.imshow(Images.alpha_composite(white, shown).convert("RGB"))
     except OSError:
         note(place, "no picture")
-
-
-def lighten(made: Figure) -> None:
-    """Make the pictures of a figure light, for a PDF, which holds them without loss.
-
-    Those that 256 colours do not change to the eye (a checkerboard, clay) get these and a fourth of
-    the bytes; smooth colours stay, at three fifths of the resolution.
-    """
-    for shown in made.findobj(AxesImage):
-        whole = Images.fromarray(np.asarray(shown.get_array()))
-        few = whole.quantize(255).convert("RGB")
-        if np.abs(np.asarray(few, dtype=np.int16) - np.asarray(whole)).mean() > 0.8:
-            few = whole.resize((round(0.6 * whole.width), round(0.6 * whole.height)))
-        extent = shown.get_extent()
-        shown.set_data(np.asarray(few))
-        shown.set_extent(extent)
-        shown.set_interpolation("none")  # resampled, it would have all colours again
 
 
 def note(place: Axes, text: str) -> None:
