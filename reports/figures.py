@@ -336,7 +336,8 @@ def light(document: IO[bytes]) -> bytes:
     made = PdfWriter(clone_from=document)
     for page in made.pages:
         for picture in page.images:
-            picture.replace(picture.image, quality=JPEG_QUALITY, optimize=True)
+            if picture.image is not None:
+                picture.replace(picture.image, quality=JPEG_QUALITY, optimize=True)
     content = io.BytesIO()
     made.write(content)
     return content.getvalue()

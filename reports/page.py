@@ -366,6 +366,7 @@ def model_page(section: Section, case: str) -> str:
                     "shape": f"../../{shape}" if shape else "",
                     "levels": viewer.LEVELS,
                     "sky": viewer.SKY_BITS,
+                    "steepest": viewer.STEEPEST,
                     "scales": {name: scale["colours"] for name, scale in scales.items()},
                     "limits": {name: scale["range"] for name, scale in scales.items()},
                 }

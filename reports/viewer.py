@@ -1,10 +1,11 @@
 """What the page's viewer is given: the shape of a model once, and each of its maps.
 
 Every file is a script that hands over one object, since a page that opens from disk may load
-scripts and nothing else. Positions are given in 16 bits of their range, uv in 14, each as the
-difference from what the parallelogram with a neighbouring face predicts (Touma and Gotsman 1998);
-distortion in 31 levels. That is below what a screen shows, and a fifth of the bytes of the plain
-numbers. No number of a table comes from here.
+scripts and nothing else. Positions are given in 16 bits of their range, as the difference from what
+the parallelogram with a neighbouring face predicts (Touma and Gotsman 1998); uv in 14, as that from
+where the neighbour's affine map takes the unfolded face (in the manner of Isenburg and Snoeyink
+2003); distortion in 31 levels, as that from what such positions and uv give. That is below what a
+screen shows, and a tenth of the bytes of the plain numbers. No number of a table comes from here.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from __future__ import annotations
 import json
 import zlib
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 import numpy.typing as npt
@@ -77,8 +78,8 @@ def steps(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
 def growth(corners: IntArray) -> tuple[IntArray, IntArray]:
     """The rows (n,) of `corners` (F, 3) as they first appear, and (3, n) what predicts each.
 
-    The fourth corner of a parallelogram, one + two - three, over the edge that the row's face
-    shares with the first one that has it; where there is none, the row before (-1 for the first).
+    The corners of the first face that shares with the row's face the edge across from the row,
+    those of the edge first; where there is none, three times the row before (-1 for the first).
     """
     row, first = np.unique(corners, return_index=True)
     order = np.argsort(first)
@@ -92,20 +93,79 @@ def growth(corners: IntArray) -> tuple[IntArray, IntArray]:
     return row, np.where(other < face, (one, two, three), before)
 
 
-def surprises(places: IntArray, corners: IntArray, bits: int) -> npt.NDArray[Any]:
+def surprises(
+    places: IntArray, corners: IntArray, bits: int, space: IntArray | None = None
+) -> npt.NDArray[Any]:
     """By how much the places (n, k), of so many bits, are not what `growth` predicts.
+
+    That is the fourth corner of a parallelogram or, for rows that lie at `space` (n, 3), where the
+    affine map of the known face takes the new one, `unfolded`.
 
     (m, k) for the rows that `corners` has, as they first appear; in zigzag: 0, -1, 1, -2, 2, ...
     """
-    row, (one, two, three) = growth(corners)
-    padded = np.concatenate([places, np.zeros_like(places[:1])])  # row -1
+    row, known = growth(corners)
+    shares = [1.0, 1.0, -1.0] if space is None else unfolded(_padded(space), row, *known)
+    (one, two, three), (a, b, c) = _padded(places)[known], (np.reshape(s, (-1, 1)) for s in shares)
+    guess = np.floor(a * one + b * two + c * three + 0.5).astype(np.int64)
     half = 2 ** (bits - 1)
-    wrong = padded[row] - padded[one] - padded[two] + padded[three]
-    wrong = (wrong + half) % (2 * half) - half
+    wrong = (places[row] - guess + half) % (2 * half) - half
     return np.asarray(np.where(wrong < 0, -2 * wrong - 1, 2 * wrong), dtype=np.uint16)
 
 
-def quantised(points: FloatArray, bits: int) -> tuple[dict[str, object], IntArray]:
+def _padded(places: IntArray) -> IntArray:
+    """`places` (n, k) with a row -1 of zeros."""
+    return np.concatenate([places, np.zeros_like(places[:1])])
+
+
+STEEPEST = 4.0
+"""A face is not unfolded over a neighbour of less than a fourth of its height."""
+
+
+def unfolded(
+    space: IntArray, row: IntArray, one: IntArray, two: IntArray, three: IntArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(n,) shares of `one`, `two` and `three` in `row`, turned into their plane about one - two.
+
+    Those of a parallelogram where that cannot be done. The viewer does the same, operation by
+    operation: what either rounds differently would add up.
+    """
+    edge = space[two] - space[one]
+    square = _dot(edge, edge)
+    safe = np.where(square > 0, square, 1)
+
+    def from_edge(of: IntArray) -> tuple[FloatArray, FloatArray]:
+        """How far along the edge, and how high over it."""
+        apart = space[of] - space[one]
+        along = _dot(apart, edge) / safe
+        off = apart - along[:, None] * edge
+        return along, np.sqrt(_dot(off, off))
+
+    (along, height), (known, least) = from_edge(row), from_edge(three)
+    sound = (square > 0) & (height <= STEEPEST * least) & (least > 0)
+    third = -height / np.where(sound, least, 1)
+    second = along - third * known
+    shares = (1 - second - third, second, third)
+    first, second, third = (np.where(sound, s, o) for s, o in zip(shares, (1, 1, -1), strict=True))
+    return first, second, third
+
+
+def _dot(one: npt.NDArray[Any], two: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """(n,) of (n, k), summed in the order of the columns."""
+    total = one[:, 0] * two[:, 0]
+    for k in range(1, one.shape[1]):
+        total = total + one[:, k] * two[:, k]
+    return np.asarray(total)
+
+
+class Box(TypedDict):
+    """Where quantised points lie: lowest corner, longest side, bits of a coordinate."""
+
+    low: list[float]
+    side: float
+    bits: int
+
+
+def quantised(points: FloatArray, bits: int) -> tuple[Box, IntArray]:
     """Where the box of points (n, k) lies, and their places in steps of its longest side."""
     low = points.min(axis=0)
     side = float(np.ptp(points, axis=0).max()) or 1.0
@@ -211,23 +271,44 @@ def uv_map(
         return {"large": len(mesh.faces)}, {}
     mesh, order, _ = ordered(mesh)
     rows, corners = indexed(mesh, parameterization.corners[order], uv[order])
-    drawn = Parameterization(rows, corners)
-    border = drawn.edge_face_count[drawn.edge_of_halfedge] == 1
-    outer = mesh.edge_face_count[mesh.edge_of_halfedge] == 1
-    ends = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2)
     moved = np.flatnonzero(corners.reshape(-1) != mesh.faces.reshape(-1))
-    lists = {
-        "moved": np.stack([moved, corners.reshape(-1)[moved]], axis=1),
-        "border": ends[border & outer],
-        "seams": ends[border & ~outer],
-    }
+    vertex = np.arange(len(rows))
+    vertex[corners] = mesh.faces
+    of_shape, space = quantised(mesh.vertices, POSITION_BITS)
     box, places = quantised(rows, UV_BITS)
+    guess = rough(space[mesh.faces], places[corners], _step(box) / _step(of_shape))
+    guess = {name: np.where(spanning[order], np.nan, values) for name, values in guess.items()}
     return {"box": box}, {
-        "uv": surprises(places, corners, UV_BITS),
+        "uv": surprises(places, corners, UV_BITS, space[vertex]),
         "state": (spanning + 2 * flipped).astype(np.uint8)[order],
-        **{name: steps(values.astype(np.uint32)) for name, values in lists.items()},
-        **{name: steps(levels(*scale)[order]) for name, scale in distortion.items()},
+        "moved": steps(np.stack([moved, corners.reshape(-1)[moved]], axis=1).astype(np.uint32)),
+        **{
+            name: levels(values[order], low, high) - levels(guess[name], low, high)
+            for name, (values, low, high) in distortion.items()
+        },
     }
+
+
+def _step(box: Box) -> float:
+    """The length of a step of `quantised`."""
+    return box["side"] / float(2 ** box["bits"] - 1)
+
+
+def rough(space: IntArray, places: IntArray, scale: float) -> dict[str, FloatArray]:
+    """Distortion of the faces whose corners lie at `space` (F, 3, 3) and at `places` (F, 3, 2).
+
+    By name (F,): "angle", log2(sigma1 / sigma2), and "area", log2(UV area / 3D area), for steps in
+    the plane that are `scale` times as long as those in space; NaN for a face without area.
+    """
+    (a, b), (p, q) = ([of[:, k] - of[:, 0] for k in (1, 2)] for of in (space, places))
+    aa, ab, bb = (_dot(*pair).astype(np.float64) for pair in ((a, a), (a, b), (b, b)))
+    area = np.sqrt(np.maximum(aa * bb - ab * ab, 0))
+    flat = np.abs(p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        half = (bb * _dot(p, p) - 2 * ab * _dot(p, q) + aa * _dot(q, q)) / (area * flat) / 2
+        ratio = half + np.sqrt(np.maximum(half * half - 1, 0))
+        found = {"angle": np.log2(ratio), "area": np.log2(flat / area * scale**2)}
+    return {name: np.where(area > 0, values, np.nan) for name, values in found.items()}
 
 
 def levels(values: FloatArray, low: float, high: float) -> npt.NDArray[np.uint8]:

@@ -20,6 +20,8 @@
     });
   }
 
+  const dot = (a, b) => { let sum = a[0] * b[0]; for (let k = 1; k < a.length; k++) sum += a[k] * b[k]; return sum; };
+
   // The object of `script` of viewer.py, its arrays in place of their description.
   async function file(address) {
     await script(address);
@@ -66,7 +68,7 @@
     return below.map((step) => (step ? next - step : next++));
   }
 
-  // Undoes `surprises`: calls `each` of a row and of the three that its parallelogram is made of.
+  // The `growth` of viewer.py: calls `each` of a row and of the three that it is predicted from.
   function grow(corners, each) {
     const base = corners.reduce((most, row) => Math.max(most, row), 0) + 1;
     const opposite = new Map(), seen = new Uint8Array(base);
@@ -90,29 +92,70 @@
     }
   }
 
-  // The places (rows, columns) of the rows that `corners` name, in whole steps.
-  function places(surprises, corners, bits) {
+  // `unfolded` of viewer.py, operation by operation; `space` gives the place of a row.
+  function shares(space, row, one, two, three) {
+    const start = space(one);
+    const from = (of) => space(of).map((x, k) => x - start[k]);
+    const edge = from(two), square = dot(edge, edge);
+    const fromEdge = (of) => {
+      const apart = from(of), along = dot(apart, edge) / square;
+      const off = apart.map((x, k) => x - along * edge[k]);
+      return [along, Math.sqrt(dot(off, off))];
+    };
+    const [along, height] = fromEdge(row), [known, least] = fromEdge(three);
+    if (!(square > 0 && height <= facts.steepest * least && least > 0)) return [1, 1, -1];
+    const third = -height / least, second = along - third * known;
+    return [1 - second - third, second, third];
+  }
+
+  // Undoes `surprises`: the places (rows, columns) of the rows that `corners` name, in whole steps.
+  function places(surprises, corners, bits, space) {
     const { columns } = surprises, mask = 2 ** bits - 1;
     const found = new Int32Array(columns * (corners.reduce((most, row) => Math.max(most, row), 0) + 1));
     let at = 0;
     grow(corners, (row, one, two, three) => {
+      const [a, b, c] = space && one >= 0 ? shares(space, row, one, two, three) : [1, 1, -1];
       for (let k = 0; k < columns; k++, at++) {
         const value = (of) => (of < 0 ? 0 : found[of * columns + k]);
+        const guess = Math.floor(a * value(one) + b * value(two) + c * value(three) + 0.5);
         const wrong = surprises[at] & 1 ? -((surprises[at] + 1) >> 1) : surprises[at] >> 1;
-        found[row * columns + k] = (value(one) + value(two) - value(three) + wrong) & mask;
+        found[row * columns + k] = (guess + wrong) & mask;
       }
     });
     return found;
   }
 
-  function points(surprises, corners, { low, side, bits }) {
-    const steps = places(surprises, corners, bits);
-    return Float32Array.from(steps, (step, at) => low[at % low.length] + (step / (2 ** bits - 1)) * side);
+  const step = ({ side, bits }) => side / (2 ** bits - 1);
+  const points = (steps, box) => Float32Array.from(steps, (at, k) => box.low[k % box.low.length] + at * step(box));
+
+  // How many faces have the edge from each corner to the next of its face.
+  function sharing(corners) {
+    const base = corners.reduce((most, row) => Math.max(most, row), 0) + 1;
+    const next = (at) => (at % 3 === 2 ? at - 2 : at + 1);
+    const key = (at) => Math.min(corners[at], corners[next(at)]) * base + Math.max(corners[at], corners[next(at)]);
+    const count = new Map();
+    for (let at = 0; at < corners.length; at++) count.set(key(at), (count.get(key(at)) ?? 0) + 1);
+    return Uint8Array.from(corners, (_, at) => Math.min(count.get(key(at)), 2));
+  }
+
+  // `rough` of viewer.py for one face, as levels: [angle, area].
+  function rough(space, plane, scale) {
+    const [a, b] = [1, 2].map((k) => space[k].map((x, i) => x - space[0][i]));
+    const [p, q] = [1, 2].map((k) => plane[k].map((x, i) => x - plane[0][i]));
+    const aa = dot(a, a), ab = dot(a, b), bb = dot(b, b);
+    const area = Math.sqrt(Math.max(aa * bb - ab * ab, 0));
+    const flat = Math.abs(p[0] * q[1] - p[1] * q[0]);
+    const half = (bb * dot(p, p) - 2 * ab * dot(p, q) + aa * dot(q, q)) / (area * flat) / 2;
+    const found = { angle: Math.log2(half + Math.sqrt(Math.max(half * half - 1, 0))), area: Math.log2((flat / area) * scale ** 2) };
+    return ["angle", "area"].map((name) => {
+      const [low, high] = facts.limits[name];
+      if (!(area > 0) || Number.isNaN(found[name])) return facts.levels + 1;
+      return Math.round(Math.min(Math.max((found[name] - low) / (high - low), 0), 1) * facts.levels);
+    });
   }
 
   // --- geometry ---
 
-  const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
   const unit = (a) => { const length = Math.hypot(...a) || 1; return a.map((x) => x / length); };
 
@@ -309,10 +352,10 @@
     const given = await file(facts.shape);
     if (given.large) throw new Error(`${given.large.toLocaleString()} faces are too many for the viewer: pictures only.`);
     const faces = counted(given.faces), order = summed(given.order);
-    const vertices = points(given.vertices, faces, given.box);
+    const steps = places(given.vertices, faces, given.box.bits), vertices = points(steps, given.box);
     const positions = gathered(vertices, 3, faces);
     shape = {
-      vertices, faces, order, positions, normals: cornerNormals(positions, faces, vertices.length / 3),
+      steps, box: given.box, outer: sharing(faces), vertices, faces, order, positions, normals: cornerNormals(positions, faces, vertices.length / 3),
       sky: gathered(places(given.sky, faces, facts.sky), 2, faces).map((step) => step / (2 ** facts.sky - 1)),
       centre: given.centre, half: given.half, size: given.size, axes: given.axes.flat(),
     };
@@ -521,13 +564,25 @@
     }
     async read() {
       const given = await file(this.element.dataset.map);
-      const [moved, border, seams, angle, area] = ["moved", "border", "seams", "angle", "area"].map((key) => summed(given[key]));
-      const kind = given.state;
+      const moved = summed(given.moved), kind = given.state;
       const corners = shape.faces.slice();
       for (let at = 0; at < moved.length; at += 2) corners[moved[at]] = moved[at + 1];
-      const rows = points(given.uv, corners, given.box);
-      const vertexOf = new Uint32Array(rows.length / 2).map((_, row) => row);
+      const vertexOf = Uint32Array.from({ length: corners.reduce((most, row) => Math.max(most, row), 0) + 1 }, (_, row) => row);
       for (let at = 0; at < moved.length; at += 2) vertexOf[moved[at + 1]] = shape.faces[moved[at]];
+      const space = (row) => [0, 1, 2].map((k) => shape.steps[3 * vertexOf[row] + k]);
+      const steps = places(given.uv, corners, given.box.bits, space);
+      const rows = points(steps, given.box);
+      const { angle, area } = given;
+      for (let face = 0; face < kind.length; face++) {
+        const own = [0, 1, 2].map((k) => corners[3 * face + k]);
+        const [a, b] = kind[face] % 2 ? [facts.levels + 1, facts.levels + 1]
+          : rough(own.map(space), own.map((row) => [steps[2 * row], steps[2 * row + 1]]), step(given.box) / step(shape.box));
+        angle[face] += a;
+        area[face] += b;
+      }
+      const open = sharing(corners), border = [], seams = [];
+      for (let at = 0; at < corners.length; at++)
+        if (open[at] === 1) (shape.outer[at] === 1 ? border : seams).push(corners[at], corners[at % 3 === 2 ? at - 2 : at + 1]);
       Object.assign(this, { uv: gathered(rows, 2, corners), angle, area, kind });
       const low = [Infinity, Infinity], high = [-Infinity, -Infinity];
       for (let at = 0; at < this.uv.length; at++) {
