@@ -43,6 +43,9 @@ DISPLAY: dict[str, tuple[str, str]] = {
     "external": ("External", ""),
     "meshed": ("Meshed", ""),
     "fam": ("FAM", ""),
+    "artist+slim": ("Artist's cut + SLIM", ""),
+    "automatic+slim": ("Automatic cut + SLIM", ""),
+    "parapoint+slim": ("ParaPoint + SLIM", ""),
     "parapoint": ("ParaPoint", ""),
 }
 """Name of a method in print and, where its parameters do not say it, what it minimises.

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -78,15 +78,26 @@ def paged(
     make: Callable[[Sequence[str]], Figure | None],
     cases: Sequence[str],
     size: int,
+    methods: Container[str] | None = None,
 ) -> list[Drawing]:
-    """A figure of `cases`, or several of `size` of them each: none is longer than a page."""
+    """A figure of `cases`, or several of `size` of them each: none is longer than a page.
+
+    It shows maps of `methods`, or of all; a model's first row stands for the model itself.
+    """
+    first = {row.case: row for row in reversed(contents.rows)}
+    first |= {row.case: row for row in reversed(contents.rows) if row.surface_hash}
     parts = [cases[at : at + size] for at in range(0, len(cases), size)]
     return [
         Drawing(
             f"{name}-{number}" if number > 1 else name,
             f"{title}, {number} of {len(parts)}" if len(parts) > 1 else title,
             caption,
-            tuple(row for row in contents.rows if row.case in part),
+            tuple(
+                row
+                for row in contents.rows
+                if row.case in part
+                and (methods is None or row.method in methods or row == first[row.case])
+            ),
             partial(make, part),
         )
         for number, part in enumerate(parts, start=1)
@@ -114,6 +125,7 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
             make=partial(models, contents, pictures),
             cases=cases,
             size=MODELS,
+            methods=(),
         ),
         *several(
             "disks",
@@ -122,6 +134,7 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
             make=partial(disks, contents, pictures),
             cases=whole,
             size=ROWS,
+            methods=("slim", "parapoint"),
         ),
         *several(
             "clouds",
@@ -136,6 +149,7 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
             make=partial(clouds, contents, pictures),
             cases=cases,
             size=ROWS,
+            methods=("parapoint",),
         ),
     ]
     if len(contents.methods) > 1 and len({label.method for label in contents.methods}) == 1:
@@ -209,6 +223,7 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
             make=partial(losses, contents),
             cases=cases,
             size=PANELS,
+            methods=("parapoint",),
         ),
         *several(
             "singular-values",

@@ -99,7 +99,7 @@ class Glance:
         names: short names of the methods that are best on most models, equals together.
         count: on how many.
         of: of how many on which any method has a value.
-        next: the method behind, with its count; "" where there is none.
+        next: the method behind, and ParaPoint where it is neither, with their counts.
     """
 
     title: str
@@ -107,7 +107,7 @@ class Glance:
     names: tuple[str, ...]
     count: int
     of: int
-    next: str
+    next: tuple[str, ...]
 
 
 def glances(contents: Contents) -> list[Glance]:
@@ -120,10 +120,13 @@ def glances(contents: Contents) -> list[Glance]:
             continue
         (_, most), *_ = counts.most_common(1)
         names = tuple(name for name in counts if counts[name] == most)
-        behind = [(name, count) for name, count in counts.most_common() if count < most]
-        after = f"{behind[0][0]} on {behind[0][1]}" if behind else ""
+        after = [name for name, count in counts.most_common() if count < most][:1]
+        ours = [label.short for label in contents.methods if label.method == "parapoint"]
+        if not {*names, *after}.intersection(ours):
+            after += sorted(ours, key=lambda name: -counts[name])[:1]
         of = sum(one is not None for one in won)
-        found.append(Glance(title, metric, names, most, of, after))
+        behind = tuple(f"{name} on {counts[name]}" for name in after)
+        found.append(Glance(title, metric, names, most, of, behind))
     return found
 
 

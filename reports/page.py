@@ -26,6 +26,7 @@ from reports.contents import Contents, Label, suite_title
 from reports.figures import Drawn
 from reports.leaderboard import MEASURES, SHOWN, Glance, Winner, definition, page_of, winner
 from reports.pictures import ANGLE_SCALE, AREA_SCALE, VIEWED, map_file, model_file, slug
+from reports.published import published_values
 from reports.table import Table, grouped, metric_column
 
 MODES = {
@@ -153,9 +154,24 @@ class Section:
         return [*lines, f"{skipped} skipped beforehand"] if skipped else lines
 
     @cached_property
-    def glances(self) -> list[Glance]:
-        """Who is best at what."""
-        return leaderboard.glances(self.contents)
+    def glances(self) -> dict[str, Glance]:
+        """Who is best at what, by its title."""
+        return {one.title: one for one in leaderboard.glances(self.contents)}
+
+    @cached_property
+    def example(self) -> tuple[str, list[tuple[Label, str]]]:
+        """The mesh that most methods map, published ones first, and its picture under each."""
+        shown = {
+            case: [
+                (label, address)
+                for label in self.contents.methods
+                if (row := self.contents.shown(case, label))
+                and (address := self.picture(map_file(row, TILES["surface"])))
+            ]
+            for case in self.contents.cases
+        }
+        case = max(shown, key=lambda case: (len(shown[case]), bool(published_values(case))))
+        return case, shown[case]
 
     @property
     def overview(self) -> list[Drawn]:
@@ -326,6 +342,12 @@ def index(folder: Path, sections: Sequence[Section]) -> str:
             cells=_inline(leaderboard.data([section.contents for section in sections])),
             grouped=grouped,
             definition=definition,
+            measures={
+                title: metric
+                for title, metric in MEASURES.items()
+                if any(title in section.glances for section in sections)
+            },
+            page_of=page_of,
             params=_params,
             metric_column=metric_column,
         )

@@ -1,5 +1,6 @@
 """The page in a real Chromium, from disk: it opens, sorts, filters, switches and points."""
 
+import re
 import shutil
 from pathlib import Path
 
@@ -9,6 +10,9 @@ from PIL import Image
 
 pytest.importorskip("playwright", reason="playwright is not installed")
 from playwright.sync_api import sync_playwright
+
+from reports.contents import contents
+from reports.pictures import Map
 
 from .conftest import HAND, NEFERTITI
 
@@ -122,18 +126,25 @@ def test_a_model_s_page_is_reached_drawn_and_switched(opened, tmp_path):
     assert page.locator("article").count() == 3
 
 
-def test_a_face_is_pointed_at_in_both_and_by_keys(opened):
+def test_a_face_is_pointed_at_in_both_and_by_keys(opened, reported):
     page = opened("index.html")
     page.locator("a.model", has_text=HAND).click()
     model(page)
     page.wait_for_function("document.querySelectorAll('[data-ready]').length === 3")
     notes = page.locator(".chosen")
+    suite = contents(reported)[0]
+    angles = Map(*suite.mapped(suite.shown(HAND, suite.methods[0]))).angle
     for kind, other in ((0, 1), (1, 0)):
         canvases = page.locator("article").first.locator("canvas")
         before = canvases.nth(other).screenshot()
         canvases.nth(kind).hover()
         page.wait_for_function("document.querySelector('.chosen').textContent !== ''")
         page.wait_for_timeout(100)
+        said = re.fullmatch(
+            r"face (\d+): stretch (?:≥ )?([\d.]+), area .*", notes.first.inner_text()
+        )
+        ends = np.clip(angles[int(said[1])], 0, 2) + [-0.05, 0.05]  # a level is 0.067 wide
+        assert ends[0] < np.log2(float(said[2])) < ends[1]
         faces = {text.split(":")[0] for text in notes.all_inner_texts()}
         assert len(faces) == 1  # the same one on every method's map
         assert faces.pop().startswith("face ")

@@ -36,7 +36,7 @@ def test_at_a_glance(suite):
         2,
         3,
     )
-    assert angles.next == "ParaPoint on 1"
+    assert angles.next == ("ParaPoint on 1",)
 
 
 def test_the_cells_are_json_with_every_metric(suite):
