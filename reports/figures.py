@@ -219,7 +219,8 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
         *several(
             "losses",
             "Losses of ParaPoint",
-            "Loss terms of ParaPoint, as they enter the total, against iterations.",
+            "Loss terms of ParaPoint, each without its weight, and their weighted total, against "
+            "iterations: means since the point before.",
             make=partial(losses, contents),
             cases=cases,
             size=PANELS,
@@ -339,11 +340,12 @@ def write(folder: Path, coarse: bool, drawing: Drawing) -> None:
             colours.putpalette([255 if level > 247 else level for level in levels])  # white paper
             few = whole.quantize(palette=colours, dither=Images.Dither.FLOYDSTEINBERG)
             few.save(files[1], optimize=True, dpi=image.info["dpi"])
-        for shown in made.findobj(AxesImage):
+        pictures = made.findobj(AxesImage)
+        for shown in pictures:
             shown.set_interpolation("none")  # as it is, at the size it is printed
         content = io.BytesIO()
         made.savefig(content, format="pdf", metadata={"CreationDate": None, "Title": drawing.title})
-        files[0].write_bytes(light(content))
+        files[0].write_bytes(light(content) if pictures else content.getvalue())
 
 
 def light(document: IO[bytes]) -> bytes:

@@ -13,7 +13,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -286,8 +286,7 @@ def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
     known = known_keys(record)
     source = source_hash("render", "pictures", "clouds", "viewer")
     with_heat = len(contents.cases) <= SHEETS
-    work: list[list[ResultRow]] = []
-    wanting: list[list[str]] = []
+    work: list[tuple[list[ResultRow], list[str]]] = []
     keys: dict[str, str] = {}
     for case in contents.cases:
         rows = [row for row in contents.rows if row.case == case and row.surface_hash]
@@ -312,12 +311,12 @@ def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
                 if row not in todo:
                     todo.append(row)
         if todo:
-            work.append(todo)
-            wanting.append(missing)
+            work.append((todo, missing))
     faults: list[str] = []
-    done = {name: keys[name] for name in keys.keys() - set(itertools.chain(*wanting))}
+    wanting = itertools.chain.from_iterable(missing for _, missing in work)
+    done = {name: keys[name] for name in keys.keys() - set(wanting)}
     made = _results(contents.store, work, folder, with_heat, jobs)
-    for missing, (failed, said) in zip(wanting, made, strict=True):
+    for (_, missing), (failed, said) in zip(work, made, strict=True):
         faults += said
         done |= {name: keys[name] for name in set(missing).difference(failed)}
         _note(record, known | done)  # a report that is stopped goes on where it was
@@ -342,22 +341,30 @@ def known_keys(record: Path) -> dict[str, str]:
 
 
 def _results(
-    store: Store, work: list[list[ResultRow]], folder: Path, with_heat: bool, jobs: int
+    store: Store,
+    work: list[tuple[list[ResultRow], list[str]]],
+    folder: Path,
+    with_heat: bool,
+    jobs: int,
 ) -> Iterator[tuple[list[str], list[str]]]:
+    make = partial(draw_model, store.folder, folder, with_heat)
     if jobs <= 1 or len(work) <= 1:
-        for rows in work:
-            yield draw_model(store.folder, rows, folder, with_heat)
+        for todo in work:
+            yield make(*todo)
         return
     with ProcessPoolExecutor(min(jobs, len(work)), mp_context=get_context("spawn")) as pool:
-        pending = [pool.submit(draw_model, store.folder, rows, folder, with_heat) for rows in work]
+        pending = [pool.submit(make, *todo) for todo in work]
         for done in pending:
             yield done.result()
 
 
 def draw_model(
-    results: Path, rows: list[ResultRow], folder: Path, with_heat: bool = True
+    results: Path, folder: Path, with_heat: bool, rows: list[ResultRow], missing: Sequence[str]
 ) -> tuple[list[str], list[str]]:
-    """Draw a model and the maps of `rows`; the files that could not be drawn, and why."""
+    """Draw the maps of `rows` and, if files of it are `missing`, their model.
+
+    The files that could not be drawn, and why.
+    """
     store = Store(results)
     case = rows[0].case
     artist = store.reference_path(rows[-1].surface_hash).exists()
@@ -381,9 +388,11 @@ def draw_model(
         if isinstance(surface, PointCloud)
         else Portrait(surface, size)
     )
-    for kind, content in subject.model().items():
-        save(content, folder / model_file(case, kind))
-    if artist:
+    kinds = model_kinds(points=points, artist=artist)
+    if not {model_file(case, kind) for kind in kinds}.isdisjoint(missing):
+        for kind, content in subject.model().items():
+            save(content, folder / model_file(case, kind))
+    if not {model_file(case, kind) for kind in ARTIST_PICTURES}.isdisjoint(missing):
         try:
             made = subject.map(store.reference(rows[-1]), ("checker-1", "layout"))
             for kind, content in zip(ARTIST_PICTURES, made.values(), strict=True):

@@ -194,7 +194,7 @@ def singular_values(contents: Contents, cases: Sequence[str]) -> Figure | None:
             sigmas = singular_value_shares(contents, row, bins) if row else None
             y = len(labels) - 1 - line
             if sigmas is None:
-                place.text(0, y + 0.1, "no map", ha="center", fontsize=6.5, color="0.5")
+                place.text(-4.8, y + 0.1, "no map", fontsize=6.5, color="0.5")
                 continue
             larger, smaller = 0.85 * sigmas / sigmas.max()
             colour = look(contents, label)["color"]

@@ -44,11 +44,17 @@ STYLE: dict[Any, Any] = {
 WIDTH = 7.0
 """Width of a figure, inches."""
 
-COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#7F7F7F", "#8C6D1F", "#000000")
-MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
-DASHES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
+COLOURS = (
+    *("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9"),
+    *("#7F7F7F", "#8C6D1F", "#000000", "#882255"),
+)
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "p", "h", "*")
+DASHES = (
+    *("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1))),
+    *((0, (1, 1)), (0, (8, 2)), (0, (6, 1, 2, 1))),
+)
 OURS = "#D55E00"
-"""Okabe and Ito's colours; the vermilion is ParaPoint's alone."""
+"""Okabe and Ito's colours and four more; the vermilion and the star are ParaPoint's alone."""
 
 
 def look(contents: Contents, label: Label) -> dict[str, Any]:
@@ -103,34 +109,33 @@ def picture_grid(
 ) -> Figure:
     """Rows of pictures (paths; other text is printed in their place) under column heads.
 
-    Each row begins with a name and a smaller text below it. `side` is a picture's, in inches.
+    Each row begins with a name and a smaller text below it. `side` is a picture's, in inches; a row
+    without any picture is low.
     """
-    gap, top = 0.06, 0.28
+    gap, top, low = 0.06, 0.28, 0.4
+    heights = [side if any(isinstance(one, Path) for one in row[2]) else low for row in rows]
     width = left + len(heads) * (side + gap)
-    height = top + len(rows) * (side + gap) + bottom
+    height = top + sum(heights) + len(rows) * gap + bottom
     made = figure(width, height)
     for column, head in enumerate(heads):
         x = (left + column * (side + gap) + side / 2) / width
         made.text(x, 1 - 0.17 / height, head, ha="center", va="center", fontsize=8.5)
-    for number, (name, text, pictures) in enumerate(rows):
-        y = height - top - (number + 1) * (side + gap) + gap
-        lines = 0.175 * (name.count("\n") + 1)
-        made.text(0.04 / width, (y + side - 0.06) / height, name, va="top", fontsize=8.5)
-        made.text(
-            0.04 / width,
-            (y + side - 0.12 - lines) / height,
-            text,
-            va="top",
-            fontsize=7,
-            color="0.3",
-        )
+    y = height - top
+    for (name, text, pictures), tall in zip(rows, heights, strict=True):
+        for down, words, size, tone in (
+            (0.06, name, 8.5, "0"),
+            (0.12 + 0.175 * (name.count("\n") + 1), text, 7, "0.3"),
+        ):
+            made.text(0.04 / width, (y - down) / height, words, va="top", fontsize=size, color=tone)
         for column, picture in enumerate(pictures):
             x = left + column * (side + gap)
-            place = made.add_axes((x / width, y / height, side / width, side / height))
+            box = (x / width, (y - tall) / height, side / width, tall / height)
+            place = made.add_axes(box)
             if isinstance(picture, Path):
                 put(place, picture)
             else:
                 note(place, picture)
+        y -= tall + gap
     return made
 
 
@@ -158,7 +163,7 @@ def small_multiples(
         right=0.975,
         top=1 - 0.25 / (down * height + bottom - 0.27),
         bottom=bottom / (down * height + bottom - 0.27),
-        hspace=0.45,
+        hspace=0.65 / (height - 0.65),  # inches, whatever the height
         wspace=0.28,
     )
     return made, [made.add_subplot(grid[n // across, n % across]) for n in range(count)]

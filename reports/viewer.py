@@ -13,6 +13,7 @@ from __future__ import annotations
 import json
 import zlib
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any, TypedDict
 
 import numpy as np
@@ -173,6 +174,7 @@ def quantised(points: FloatArray, bits: int) -> tuple[Box, IntArray]:
     return {"low": low.tolist(), "side": side, "bits": bits}, places
 
 
+@lru_cache(maxsize=1)  # of one model there are many maps
 def ordered(mesh: Mesh) -> tuple[Mesh, IntArray, IntArray]:
     """The mesh with its faces along a walk over their edges, its vertices as these meet them.
 

@@ -88,7 +88,7 @@
   }
 
   const metrics = () => { const wanted = chosen("metric"); return facts.metrics.map((metric, at) => ({ ...metric, at })).filter(({ name }) => wanted.has(name)); };
-  const head = (metric) => ({ text: `${metric.title}${metric.percent && !metric.title.endsWith("%") ? " %" : ""} ${metric.better === "higher" ? "↑" : "↓"}`, title: metric.definition });
+  const head = (metric) => ({ text: `${metric.title}${metric.percent && !metric.title.endsWith("%") ? " %" : ""}\u00a0${metric.better === "higher" ? "↑" : "↓"}`, title: metric.definition });
 
   function overSeeds(cells, metric) {
     const values = cells.filter((cell) => cell.status === "ok").map((cell) => number(cell.values[metric.at])).filter((value) => value !== null);
