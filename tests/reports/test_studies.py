@@ -33,6 +33,7 @@ def test_a_pair_by_hand():
 
 def test_a_pair_without_a_difference_has_no_p():
     assert math.isnan(pair(np.ones(6), np.ones(6)).p)
+    assert pair(np.ones(1), np.zeros(1)).p == 1  # either sign is as likely
     assert math.isnan(pair(np.ones(0), np.ones(0)).difference)
 
 
