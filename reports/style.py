@@ -62,7 +62,9 @@ def look(contents: Contents, label: Label) -> dict[str, Any]:
     if label.method == "parapoint":
         ours = [other for other in contents.methods if other.method == "parapoint"]
         at = ours.index(label) % len(DASHES)
-        return {"color": OURS, "linestyle": DASHES[at], "marker": MARKERS[-1 - at]}
+        alone = len(ours) == len(contents.methods)  # an ablation: its variants need colours, too
+        colour = COLOURS[at - 1] if at and alone else OURS
+        return {"color": colour, "linestyle": DASHES[at], "marker": MARKERS[-1 - at]}
     others = [other for other in contents.methods if other.method != "parapoint"]
     turn, at = divmod(others.index(label), len(COLOURS))
     other = (at + turn) % len(COLOURS)  # a colour that comes again has other marks
@@ -179,13 +181,16 @@ def plain_log(axis: Axis) -> None:
 
 
 def legend_below(made: Figure, places: Sequence[Axes]) -> None:
-    """One legend for all panels, each method once."""
+    """One legend for all panels, each method once, in as many columns as there is room for."""
     found: dict[str, Any] = {}
     for place in places:
         for handle, text in zip(*place.get_legend_handles_labels(), strict=True):
             found.setdefault(text, handle)
-    if found:
-        made.legend(
-            list(found.values()), list(found), loc="lower center", ncols=min(4, len(found)),
+    for columns in range(min(4, len(found)), 0, -1):
+        legend = made.legend(
+            list(found.values()), list(found), loc="lower center", ncols=columns,
             columnspacing=1.4, handlelength=2.6,
         )  # fmt: skip
+        if columns == 1 or legend.get_window_extent().width < made.bbox.width:
+            break
+        legend.remove()

@@ -71,9 +71,14 @@ _ESCAPED = str.maketrans({"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r"})
 """The letters that may not stand in such a string as they are."""
 
 
-def steps(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Differences along the rows of unsigned integers, from 0; they wrap around."""
-    return np.diff(values, axis=0, prepend=np.zeros_like(values[:1]))
+def steps(values: IntArray) -> npt.NDArray[Any]:
+    """Differences along the rows, from 0, in `zigzag`."""
+    return zigzag(np.diff(values, axis=0, prepend=0)).astype(np.uint32)
+
+
+def zigzag(values: IntArray) -> IntArray:
+    """Integers as natural numbers: 0, -1, 1, -2, 2, ... as 0, 1, 2, 3, 4, ..."""
+    return np.where(values < 0, -2 * values - 1, 2 * values)
 
 
 def growth(corners: IntArray) -> tuple[IntArray, IntArray]:
@@ -102,7 +107,7 @@ def surprises(
     That is the fourth corner of a parallelogram or, for rows that lie at `space` (n, 3), where the
     affine map of the known face takes the new one, `unfolded`.
 
-    (m, k) for the rows that `corners` has, as they first appear; in zigzag: 0, -1, 1, -2, 2, ...
+    (m, k) for the rows that `corners` has, as they first appear, in `zigzag`.
     """
     row, known = growth(corners)
     shares = [1.0, 1.0, -1.0] if space is None else unfolded(_padded(space), row, *known)
@@ -110,7 +115,7 @@ def surprises(
     guess = np.floor(a * one + b * two + c * three + 0.5).astype(np.int64)
     half = 2 ** (bits - 1)
     wrong = (places[row] - guess + half) % (2 * half) - half
-    return np.asarray(np.where(wrong < 0, -2 * wrong - 1, 2 * wrong), dtype=np.uint16)
+    return zigzag(wrong).astype(np.uint16)
 
 
 def _padded(places: IntArray) -> IntArray:
@@ -178,7 +183,8 @@ def quantised(points: FloatArray, bits: int) -> tuple[Box, IntArray]:
 def ordered(mesh: Mesh) -> tuple[Mesh, IntArray, IntArray]:
     """The mesh with its faces along a walk over their edges, its vertices as these meet them.
 
-    And the old numbers, (F,) of the faces and (V,) of the vertices; a vertex without a face goes.
+    A face that shares an edge with the one before begins with it. And the old numbers: (F, 3) of
+    the corners, counted through the faces, and (V,) of the vertices; one without a face goes.
     """
     count = len(mesh.faces)
     halfedge = np.argsort(mesh.edge_of_halfedge, kind="stable")
@@ -195,12 +201,22 @@ def ordered(mesh: Mesh) -> tuple[Mesh, IntArray, IntArray]:
     walk = csgraph.depth_first_order(
         graph(one, two, count + 1), count, directed=False, return_predecessors=False
     )
-    face = walk[1:].astype(np.int64)
-    old, first, number = np.unique(mesh.faces[face], return_index=True, return_inverse=True)
+    faces = mesh.faces[walk[1:]]
+    shared = _among(faces, np.roll(faces, 1, axis=0)) < 3
+    turn = np.where(shared.sum(axis=1) == 2, shared.argmin(axis=1) + 1, 0)
+    corner = 3 * walk[1:, None].astype(np.int64) + (np.arange(3) + turn[:, None]) % 3
+    flat = mesh.faces.reshape(-1)[corner]
+    old, first, number = np.unique(flat, return_index=True, return_inverse=True)
     met = np.argsort(first)
     rank = np.empty_like(met)
     rank[met] = np.arange(len(met))
-    return Mesh(mesh.vertices[old[met]], rank[number].reshape(-1, 3)), face, old[met]
+    return Mesh(mesh.vertices[old[met]], rank[number].reshape(-1, 3)), corner, old[met]
+
+
+def _among(faces: IntArray, others: IntArray) -> IntArray:
+    """(F, 3) which corner of the face in `others` (F, 3) each corner of `faces` is; 3 for none."""
+    same = faces[:, :, None] == others[:, None, :]
+    return np.where(same.any(axis=2), same.argmax(axis=2), 3)
 
 
 def shape(mesh: Mesh, camera: Camera, sky: Floats) -> Script:
@@ -210,7 +226,7 @@ def shape(mesh: Mesh, camera: Camera, sky: Floats) -> Script:
     """
     if len(mesh.faces) > LARGEST:
         return {"large": len(mesh.faces)}, {}
-    near, face, vertex = ordered(mesh)
+    near, corner, vertex = ordered(mesh)
     box, places = quantised(near.vertices, POSITION_BITS)
     facts = {
         "box": box,
@@ -222,10 +238,14 @@ def shape(mesh: Mesh, camera: Camera, sky: Floats) -> Script:
     flat = near.faces.reshape(-1)
     highest = np.maximum.accumulate(flat)
     below = np.concatenate([[0], highest[:-1] + 1]) - flat  # 0 for a vertex that is new
+    before = np.concatenate([[[-1, -1, -1]], near.faces[:-1]])
+    place = _among(near.faces, before)
+    place[:, 2] = 3
     light = np.round((2**SKY_BITS - 1) * sky[vertex]).astype(np.int64)
     return facts, {
-        "faces": below.astype(np.uint32).reshape(-1, 3),
-        "order": steps(face.astype(np.uint32)),
+        "places": (place[:, 0] + 4 * place[:, 1]).astype(np.uint8),
+        "faces": below[place.reshape(-1) == 3].astype(np.uint32),
+        "order": steps(corner[:, 0] // 3),
         "vertices": surprises(places, near.faces, POSITION_BITS),
         "sky": surprises(light, near.faces, SKY_BITS),
     }
@@ -271,8 +291,10 @@ def uv_map(
     """
     if len(mesh.faces) > LARGEST:
         return {"large": len(mesh.faces)}, {}
-    mesh, order, _ = ordered(mesh)
-    rows, corners = indexed(mesh, parameterization.corners[order], uv[order])
+    mesh, corner, _ = ordered(mesh)
+    order = corner[:, 0] // 3
+    at = parameterization.corners.reshape(-1)[corner]
+    rows, corners = indexed(mesh, at, uv.reshape(-1, 2)[corner])
     moved = np.flatnonzero(corners.reshape(-1) != mesh.faces.reshape(-1))
     vertex = np.arange(len(rows))
     vertex[corners] = mesh.faces
@@ -283,7 +305,7 @@ def uv_map(
     return {"box": box}, {
         "uv": surprises(places, corners, UV_BITS, space[vertex]),
         "state": (spanning + 2 * flipped).astype(np.uint8)[order],
-        "moved": steps(np.stack([moved, corners.reshape(-1)[moved]], axis=1).astype(np.uint32)),
+        "moved": steps(np.stack([moved, corners.reshape(-1)[moved]], axis=1)),
         **{
             name: levels(values[order], low, high) - levels(guess[name], low, high)
             for name, (values, low, high) in distortion.items()

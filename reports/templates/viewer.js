@@ -56,16 +56,26 @@
     return bytes;
   }
 
-  // Undoes `steps`: sums down the rows, which wrap around.
+  // Undoes `zigzag`.
+  const signed = (step) => (step % 2 ? -(step + 1) / 2 : step / 2);
+
+  // Undoes `steps`: sums down the rows.
   function summed(values) {
-    for (let at = values.columns; at < values.length; at++) values[at] += values[at - values.columns];
+    for (let at = 0; at < values.length; at++) values[at] = signed(values[at]) + (values[at - values.columns] ?? 0);
     return values;
   }
 
-  // The faces whose corners are given as how far they are below the highest before; 0 is a new one.
-  function counted(below) {
-    let next = 0;
-    return below.map((step) => (step ? next - step : next++));
+  // The faces: a corner is that of the face before which `places` says or, at 3, given by how far it
+  // is below the highest before; 0 is a new one.
+  function connected(places, below) {
+    const faces = new Uint32Array(3 * places.length);
+    let next = 0, at = 0;
+    for (let corner = 0; corner < faces.length; corner++) {
+      const k = corner % 3, place = k === 2 ? 3 : (places[(corner - k) / 3] >> (2 * k)) & 3;
+      if (place < 3) faces[corner] = faces[corner - k - 3 + place];
+      else { const step = below[at++]; faces[corner] = step ? next - step : next++; }
+    }
+    return faces;
   }
 
   // The `growth` of viewer.py: calls `each` of a row and of the three that it is predicted from.
@@ -118,8 +128,7 @@
       for (let k = 0; k < columns; k++, at++) {
         const value = (of) => (of < 0 ? 0 : found[of * columns + k]);
         const guess = Math.floor(a * value(one) + b * value(two) + c * value(three) + 0.5);
-        const wrong = surprises[at] & 1 ? -((surprises[at] + 1) >> 1) : surprises[at] >> 1;
-        found[row * columns + k] = (guess + wrong) & mask;
+        found[row * columns + k] = (guess + signed(surprises[at])) & mask;
       }
     });
     return found;
@@ -351,7 +360,7 @@
   async function readShape() {
     const given = await file(facts.shape);
     if (given.large) throw new Error(`${given.large.toLocaleString()} faces are too many for the viewer: pictures only.`);
-    const faces = counted(given.faces), order = summed(given.order);
+    const faces = connected(given.places, given.faces), order = summed(given.order);
     const steps = places(given.vertices, faces, given.box.bits), vertices = points(steps, given.box);
     const positions = gathered(vertices, 3, faces);
     shape = {

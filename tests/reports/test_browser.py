@@ -98,7 +98,7 @@ def test_the_leaderboard_sorts_and_filters(opened):
     assert HAND not in column(page, 1)
     page.locator("#filters summary", has_text="Metrics").click()
     page.locator("input[name=metric][value=chart_count]").check()
-    assert "charts ↓" in heads.all_inner_texts()
+    assert "charts\u00a0↓" in heads.all_inner_texts()
     page.select_option("select[name=view]", "model")
     assert "timeout" in page.locator("#board tbody").inner_text()
     before = column(page, 2)

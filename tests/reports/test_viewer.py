@@ -56,11 +56,16 @@ def test_letters_by_sevens_are_every_one_of_them():
     assert eights(json.loads(f'"{viewer.sevens(b"any")}"', strict=False)) == b"any"
 
 
-def test_steps_wrap_around():
-    values = np.array([[3, 250], [1, 4]], np.uint8)
+def summed(steps):
+    """Undoes `steps`."""
+    return np.cumsum(np.where(steps % 2, -(steps + 1) // 2, steps // 2), axis=0)
+
+
+def test_steps_are_small_and_undone():
+    values = np.array([[3, 250], [1, 4]])
     steps = viewer.steps(values)
-    assert steps.tolist() == [[3, 250], [254, 10]]
-    np.testing.assert_array_equal(np.cumsum(steps, axis=0, dtype=np.uint8), values)
+    assert steps.tolist() == [[6, 500], [3, 491]]
+    np.testing.assert_array_equal(summed(steps.astype(int)), values)
 
 
 def shares(one, two, three, new):
@@ -130,11 +135,18 @@ def shape(mesh):
     sky = np.linspace(0, 1, 2 * len(mesh.vertices)).reshape(-1, 2)
     _, given = read(viewer.script("a.js", *viewer.shape(mesh, camera, sky)))
     assert given["axes"] == camera.axes.tolist()
-    faces, highest = [], 0
-    for below in given["faces"].reshape(-1):
-        faces.append(highest - below)
-        highest += below == 0
-    return given, np.array(faces).reshape(-1, 3), sky
+    faces, highest, rest = [], 0, iter(given["faces"][:, 0])
+    for code in given["places"][:, 0]:
+        face = []
+        for place in (code % 4, code // 4, 3):
+            if place < 3:
+                face.append(faces[-1][place])
+            else:
+                below = next(rest)
+                face.append(highest - below)
+                highest += below == 0
+        faces.append(face)
+    return given, np.array(faces), sky
 
 
 def test_a_shape_is_given_to_a_65535th_of_its_size():
@@ -145,15 +157,17 @@ def test_a_shape_is_given_to_a_65535th_of_its_size():
         np.concatenate([mesh.faces + 1, mesh.faces[:, ::-1] + 1 + len(mesh.vertices)])[::-1],
     )
     given, faces, sky = shape(mesh)
-    order = np.cumsum(given["order"][:, 0]) % 2**32
+    order = summed(given["order"][:, 0])
+    corner = viewer.ordered(mesh)[1]
+    np.testing.assert_array_equal(corner[:, 0] // 3, order)
     assert sorted(order) == list(range(len(mesh.faces)))
     box = given["box"]
     found = places(given["vertices"], faces, 16) / 65535 * box["side"] + box["low"]
     assert len(found) == len(mesh.vertices) - 1
-    expected = mesh.vertices[mesh.faces[order]]
+    expected = mesh.vertices[mesh.faces.reshape(-1)[corner]]
     np.testing.assert_allclose(found[faces], expected, atol=box["side"] / 65535)
     light = places(given["sky"], faces, 8) / 255
-    np.testing.assert_allclose(light[faces], sky[mesh.faces[order]], atol=1 / 255)
+    np.testing.assert_allclose(light[faces], sky[mesh.faces.reshape(-1)[corner]], atol=1 / 255)
 
 
 def data(mesh, result):
@@ -166,10 +180,10 @@ def data(mesh, result):
 
 
 def drawn(mesh, given):
-    """The old numbers of the faces, the rows and uv of their corners, and the levels of angles."""
+    """The old numbers of the corners, their rows and uv, and the levels of angles."""
     near, order, _ = viewer.ordered(mesh)
     corners = near.faces.reshape(-1).copy()
-    place, row = np.cumsum(given["moved"], axis=0).T % 2**32
+    place, row = summed(given["moved"]).T
     corners[place] = row
     corners, box = corners.reshape(-1, 3), given["box"]
     vertex = np.zeros(corners.max() + 1, int)
@@ -186,8 +200,10 @@ def test_a_map_that_is_not_cut_lists_no_corners():
     found, given = data(mesh, flat(mesh))
     assert len(given["moved"]) == 0
     order, _, uv, angle = drawn(mesh, given)
-    np.testing.assert_allclose(uv, found.uv[order], atol=given["box"]["side"] / 16383)
-    expected = viewer.levels(found.angle, 0.0, 2.0)[order]
+    np.testing.assert_allclose(
+        uv, found.uv.reshape(-1, 2)[order], atol=given["box"]["side"] / 16383
+    )
+    expected = viewer.levels(found.angle, 0.0, 2.0)[order[:, 0] // 3]
     np.testing.assert_array_equal(angle, expected)
     assert (given["angle"] == 0).mean() > 0.95
 
@@ -202,7 +218,9 @@ def test_a_cut_map_comes_back_with_its_seams():
     found, given = data(mesh, Parameterization(uv, np.arange(len(uv)).reshape(-1, 3)))
     order, corners, again, _ = drawn(mesh, given)
     assert len(np.unique(corners)) == corners.size
-    np.testing.assert_allclose(again, found.uv[order], atol=given["box"]["side"] / 16383)
+    np.testing.assert_allclose(
+        again, found.uv.reshape(-1, 2)[order], atol=given["box"]["side"] / 16383
+    )
 
 
 def test_rough_distortion_of_a_stretch_known_by_hand():
