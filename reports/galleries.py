@@ -31,7 +31,7 @@ from reports.pictures import (
     map_file,
     model_file,
 )
-from reports.style import WIDTH, figure, note, picture_grid, put, wrapped
+from reports.style import WIDTH, figure, picture_grid, put, wrapped
 
 
 def leading(contents: Contents, method: str) -> Label | None:
@@ -168,7 +168,9 @@ def cut_model(contents: Contents, case: str, pictures: Path) -> Figure | None:
         panels.append(("hand-made: the artist's map", "", artist))
     for label in chosen:
         row = contents.shown(case, label)
-        cut = "automatic cut" if row is not None and CUT in row.preprocessing else "learned seam"
+        learned = "learned seam" if label.method == "parapoint" else "uncut"
+        was_cut = CUT in row.preprocessing if row else learned == "uncut" and is_cut(contents, case)
+        cut = "automatic cut" if was_cut else learned
         shown = pictures_of(contents, case, label, ("checker-1", "layout"), pictures)
         text = values_text(contents, row) if row else ""
         panels.append((f"{label.name}, {cut}", text, shown))
@@ -180,10 +182,7 @@ def cut_model(contents: Contents, case: str, pictures: Path) -> Figure | None:
     for number, picture in enumerate(shown_all):
         x = number * (side + 0.04) / WIDTH
         place = made.add_axes((x, foot / (side + foot), side / WIDTH, side / (side + foot)))
-        if isinstance(picture, Path):
-            put(place, picture)
-        else:
-            note(place, picture)
+        put(place, picture)
     name = wrapped(f"(a) {case.replace('_', ' ').replace('-', ' ')}", 20)
     top, below = 0.5 / (side + foot), 0.32 / (side + foot)
     made.text(side / 2 / WIDTH, top, name, ha="center", va="top", fontsize=8)
@@ -212,10 +211,7 @@ def ablation(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure
             for down, picture in enumerate(shown, start=1):
                 box = (x / WIDTH, (y - down * side) / height, side / WIDTH, side / height)
                 place = made.add_axes(box)
-                if isinstance(picture, Path):
-                    put(place, picture)
-                else:
-                    note(place, picture)
+                put(place, picture)
             row = contents.shown(case, label)
             made.text(
                 (x + side / 2) / WIDTH,
@@ -263,10 +259,7 @@ def ablation_of_the_paper(contents: Contents, pictures: Path) -> Figure | None:
         for down, picture in enumerate(shown, start=1):
             box = (x / WIDTH, (height - down * side) / height, side / WIDTH, side / height)
             place = made.add_axes(box)
-            if isinstance(picture, Path):
-                put(place, picture)
-            else:
-                note(place, picture)
+            put(place, picture)
         made.text((x + side / 2) / WIDTH, 0.2 / height, words, ha="center", va="top", fontsize=8)
     return made
 

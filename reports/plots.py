@@ -170,7 +170,8 @@ def pareto(contents: Contents, cases: Sequence[str]) -> Figure | None:
         place.step(points[:, 0], best, where="post", color="0.6", linewidth=0.8, zorder=1)
         place.set_yscale("log")
         plain_log(place.yaxis)
-        place.set_xlim(left=0)
+        right = place.get_xlim()[1]
+        place.set_xlim(-0.04 * right, right)  # no marker is cut at 0
         place.set_title(case)
         place.set_xlabel("area discrepancy")
     places[0].set_ylabel("angle difference [rad]")

@@ -78,11 +78,14 @@ def figure(width: float, height: float) -> Figure:
     return made
 
 
-def put(place: Axes, path: Path) -> None:
-    """Show a picture on white at `place`, at the size it is printed; a note where there is none."""
+def put(place: Axes, picture: Path | str) -> None:
+    """Show a picture on white at `place`, at the size it is printed; other text as a note."""
     place.set_axis_off()
+    if isinstance(picture, str):
+        note(place, picture)
+        return
     try:
-        with Images.open(path) as image:
+        with Images.open(picture) as image:
             box = place.get_window_extent()
             scale = mpl.rcParams["savefig.dpi"] / mpl.rcParams["figure.dpi"]
             shown = image.convert("RGBA")
@@ -133,10 +136,7 @@ def picture_grid(
             x = left + column * (side + gap)
             box = (x / width, (y - tall) / height, side / width, tall / height)
             place = made.add_axes(box)
-            if isinstance(picture, Path):
-                put(place, picture)
-            else:
-                note(place, picture)
+            put(place, picture)
         y -= tall + gap
     return made
 
@@ -176,8 +176,17 @@ def plain_log(axis: Axis) -> None:
     low, high = axis.get_view_interval()
     subs = (1.0, 2.0, 5.0) if high < 100 * low else (1.0,)
     axis.set_major_locator(LogLocator(subs=subs, numticks=7))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,g}"))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: _plain(value)))
     axis.set_minor_formatter(NullFormatter())
+
+
+def _plain(value: float) -> str:
+    """A number, as a power of ten below 0.0001."""
+    if value >= 1e-4:
+        return f"{value:,g}"
+    mantissa, exponent = f"{value:.0e}".split("e")
+    factor = "" if mantissa == "1" else rf"{mantissa} \cdot "
+    return f"${factor}10^{{{int(exponent)}}}$"
 
 
 def legend_below(made: Figure, places: Sequence[Axes]) -> None:
