@@ -116,6 +116,9 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
     meshes = [case for case in cases if case not in contents.clouds]
     whole = [case for case in meshes if not is_cut(contents, case)]
     several = partial(paged, contents)
+    sheets = cases if len(cases) <= SHEETS else []
+    told = [case for case in cases if case in sheets or published_values(case)]
+    as_points = [case for case in cases if case in told or case in contents.clouds]
 
     found = [
         *several(
@@ -143,11 +146,12 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
             "true normals, which it does not get. (b) Their uv, in the same colours. (c) The "
             f"checkerboard on {DENSE:,} points. (d) Green: points of the faces that span a learned "
             "seam. The uv of a point is interpolated in its face, or is that of the nearest corner "
-            "where the face spans a seam: the results hold no network that could be asked. Where "
+            "where the face spans a seam: the results hold no network that could be asked. Of a "
+            f"suite of more than {SHEETS} meshes, those of the paper are shown. Where "
             "the model is a cloud itself, (c) shows its own points as disks, and (d) those where "
             "the map tears between neighbours.",
             make=partial(clouds, contents, pictures),
-            cases=cases,
+            cases=as_points,
             size=ROWS,
             methods=("parapoint",),
         ),
@@ -172,11 +176,9 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
                 partial(ablation_of_the_paper, contents, pictures),
             ),
         ]
-    sheets = cases if len(cases) <= SHEETS else []
-    for case in cases:
+    for case in told:
         rows = tuple(row for row in contents.rows if row.case == case)
-        told = case in sheets or published_values(case)
-        if told and (is_cut(contents, case) or contents.has_artist(case)):
+        if is_cut(contents, case) or contents.has_artist(case):
             found.append(
                 Drawing(
                     f"cut-{slug(case)}",

@@ -30,6 +30,7 @@ from parapoint.parameterization import Parameterization
 from parapoint.surface import BoolArray, FloatArray, Mesh, PointCloud, edge_table
 from reports import clouds, render, viewer
 from reports.contents import Contents
+from reports.published import published_values
 from reports.render import Camera, Floats, Image, Scene, View
 
 Content = Image | viewer.Script
@@ -237,18 +238,20 @@ def model_kinds(*, points: bool, artist: bool) -> tuple[str, ...]:
     return MODEL_PICTURES + (VIEWED,) * (not points) + ARTIST_PICTURES * artist
 
 
-def map_kinds(method: str, *, points: bool, with_heat: bool) -> tuple[str, ...]:
+def map_kinds(row: ResultRow, *, points: bool, with_heat: bool) -> tuple[str, ...]:
     """The files of a map, of `points` or of a mesh: of both, for the one method that sees points.
 
-    Without the figures of a model the second view of other methods is in none.
+    In a suite without the figures of a model the second view of other methods is in none, and only
+    the paper's models are shown as points.
     """
     if points:
         return CLOUD_PICTURES
-    second_view = with_heat or method in {"slim", "parapoint"}
+    second_view = with_heat or row.method in {"slim", "parapoint"}
+    as_points = row.method == "parapoint" and (with_heat or bool(published_values(row.case)))
     return (
         *(kind for kind in TEXTURED_PICTURES if second_view or kind != "checker-2"),
         *HEAT_PICTURES * with_heat,
-        *CLOUD_PICTURES * (method == "parapoint"),
+        *CLOUD_PICTURES * as_points,
         VIEWED,
     )
 
@@ -300,7 +303,7 @@ def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
         wanted = dict.fromkeys(names, (latest, str(artist)))
         for row in rows:
             if row.status == "ok":
-                own = map_kinds(row.method, points=points, with_heat=with_heat)
+                own = map_kinds(row, points=points, with_heat=with_heat)
                 files = (map_file(row, kind) for kind in own)
                 wanted |= dict.fromkeys(files, (row, row.uv_sha256))
         for name, (row, content) in wanted.items():
@@ -372,7 +375,7 @@ def draw_model(
     faults: list[str] = []
 
     def files_of(row: ResultRow, points: bool) -> list[str]:
-        own = map_kinds(row.method, points=points, with_heat=with_heat)
+        own = map_kinds(row, points=points, with_heat=with_heat)
         return [map_file(row, kind) for kind in own if row.status == "ok"]
 
     try:
@@ -405,7 +408,7 @@ def draw_model(
             continue
         try:
             result = store.result(row)
-            kinds = map_kinds(row.method, points=points, with_heat=with_heat)
+            kinds = map_kinds(row, points=points, with_heat=with_heat)
             for kind, content in subject.map(result, kinds).items():
                 save(content, folder / map_file(row, kind))
         except InputError as error:
