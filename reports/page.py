@@ -22,7 +22,7 @@ from benchmarks.results import ResultRow
 from parapoint.errors import InputError
 from parapoint.surface import Mesh
 from reports import exports, leaderboard, viewer
-from reports.contents import Contents, Label, suite_title
+from reports.contents import AREA, Contents, Label, number, suite_title
 from reports.figures import Drawn
 from reports.leaderboard import MEASURES, SHOWN, Glance, Winner, definition, page_of, winner
 from reports.pictures import ANGLE_SCALE, AREA_SCALE, VIEWED, map_file, model_file, slug
@@ -160,7 +160,10 @@ class Section:
 
     @cached_property
     def example(self) -> tuple[str, list[tuple[Label, str]]]:
-        """The mesh that most methods map, published ones first, and its picture under each."""
+        """A mesh and its picture under each method.
+
+        One that most methods map; of these one of the paper, on which they differ most in areas.
+        """
         shown = {
             case: [
                 (label, address)
@@ -170,7 +173,14 @@ class Section:
             ]
             for case in self.contents.cases
         }
-        case = max(shown, key=lambda case: (len(shown[case]), bool(published_values(case))))
+
+        def worth(case: str) -> tuple[int, bool, float]:
+            records = [self.contents.records.get((case, label.short)) for label, _ in shown[case]]
+            areas = [area for one in records if (area := number(one, AREA)) is not None]
+            spread = max(areas) - min(areas) if areas else 0.0
+            return len(shown[case]), bool(published_values(case)), spread
+
+        case = max(shown, key=worth)
         return case, shown[case]
 
     @property
