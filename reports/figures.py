@@ -242,7 +242,8 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
         Drawing(
             "cost",
             "Time against size",
-            "Wall time of each method against the number of faces.",
+            "Wall time of each method against the number of faces, model by model; the lines are "
+            "the power laws that fit it best.",
             contents.rows,
             partial(cost, contents),
         ),

@@ -234,7 +234,7 @@ def singular_value_shares(
 
 
 def cost(contents: Contents) -> Figure | None:
-    """Time against the number of faces for every method."""
+    """Time against the number of faces for every method, and the power law that fits it."""
     surfaces = {case: contents.mesh(case) for case in contents.cases}
     sizes = {case: len(mesh.faces) for case, mesh in surfaces.items() if mesh is not None}
     if len(set(sizes.values())) < 2:
@@ -243,11 +243,17 @@ def cost(contents: Contents) -> Figure | None:
     place = places[0]
     for label in contents.methods:
         rows = [contents.shown(case, label) for case in sizes]
-        points = sorted((sizes[row.case], row.seconds) for row in rows if row and row.seconds)
-        if points:
-            place.plot(
-                *zip(*points, strict=True), label=label.short, markersize=4, **look(contents, label)
-            )
+        points = [(sizes[row.case], row.seconds) for row in rows if row and row.seconds]
+        if not points:
+            continue
+        style = look(contents, label)
+        faces, seconds = np.array(points, dtype=np.float64).T
+        place.plot(faces, seconds, markersize=3.5, alpha=0.5, **(style | {"linestyle": "none"}))
+        ends = np.array([faces.min(), faces.max()])
+        # With two sizes or fewer there is nothing to fit: the line joins them.
+        power = np.polyfit(np.log(faces), np.log(seconds), min(1, len(np.unique(faces)) - 1))
+        line = np.exp(np.polyval(power, np.log(ends)))
+        place.plot(ends, line, label=label.short, markersize=4, markevery=[], **style)
     place.set_xscale("log")
     place.set_yscale("log")
     plain_log(place.xaxis)
