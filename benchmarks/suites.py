@@ -40,8 +40,8 @@ REDUCED = "points=4096, iterations=2800, subset=256, all_from=0.997"
 PAPER_REDUCED = f"parapoint(preset=paper, {REDUCED})"
 PAPER_SHORT = "parapoint(preset=paper, points=2048, iterations=300, subset=256, all_from=0.99)"
 FAST = "parapoint(preset=fast, time_budget=120)"
-# Neural maps under one budget: seconds of training, points of a step.
-EQUAL = "points=4096, subset=256, time_budget=300"
+# Neural maps under one budget, that of `FAST`: seconds of training, points of a step.
+EQUAL = "points=4096, subset=256, time_budget=120"
 
 HYBRID = "parapoint+slim(time_budget=120)"
 LEARNED_SEAM = "parapoint+slim(time_budget=120, price=None)"
@@ -142,7 +142,7 @@ SUITES: dict[str, Suite] = {
         ),
         Suite(
             "neural",
-            "Neural maps with 300 s of training each",
+            "Neural maps with 120 s each",
             (*PAPER_CASES, "camelhead"),
             (
                 f"parapoint(preset=paper, {EQUAL}, all_from=1.0)",

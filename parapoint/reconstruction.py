@@ -7,12 +7,18 @@ left to take, which keeps noise from growing handles.
 
 Where two sheets are nearer to each other than their points are, no front tells them apart. One more
 front therefore takes only the triangles between inside and outside (`parapoint.delaunay`), as they
-face; of all the one with the fewest defects is kept. Open sheets have no inside.
+face. Open sheets have no inside.
+
+Where sheets cross, no such front goes straight through: it turns from one sheet to the other. The
+last front therefore takes the triangles that face as the normals of the points' own sheets do,
+those along one of two sheets that cross among them (`parapoint.sheets`). It is kept where it is
+smoother than the best of the others by more than chance.
 """
 
 from __future__ import annotations
 
 import heapq
+import math
 
 import numpy as np
 from scipy import sparse
@@ -20,6 +26,7 @@ from scipy.sparse import csgraph
 from scipy.spatial import QhullError, cKDTree
 
 from parapoint.delaunay import delaunay_complex, empty_radii, insideness
+from parapoint.sheets import sheet_normals, sheet_triangles, unit_normals
 from parapoint.surface import FloatArray, IntArray, Mesh, edge_table
 
 Vector = tuple[float, float, float]
@@ -32,6 +39,18 @@ SHARPEST = -0.8
 """Least cosine between the normals of neighbouring triangles."""
 GLUE = 0.3
 """Least cosine between a triangle's normal and that of a vertex where the front meets itself."""
+TIGHTEST = 1.2
+"""Largest empty ball of a triangle that has a say in the normals, in spacings."""
+AGAINST = -0.3
+"""Least cosine between a triangle along the sheets and any of the three normals at its corners."""
+DISAGREEMENT = 2.0
+"""Such a triangle counts as larger by so many times 1 − its mean cosine with them."""
+QUARTER = math.pi / 2
+SHARP = math.pi / 3
+"""A turn from one sheet that crosses another to that one is at least so sharp, in radians."""
+SMOOTHER = 0.97
+"""Most of its roughness that the front along sheets leaves where it is taken; without sheets that
+cross it leaves 0.98 or more. It is not tried where turns from sheet to sheet are fewer."""
 LONGEST_HOLE = 12
 """Edges of the largest hole that is filled."""
 HANDLE = 30
@@ -66,7 +85,35 @@ def triangulation(points: FloatArray) -> Mesh:
     if between.any():
         args = points, outward[between], radius[between], BEND_COSTS[-1]
         fronts.append(_Front(*args, is_oriented=True))
-    return min((_largest_part(points, front.grown()) for front in fronts), key=defects)
+    best = min((_largest_part(points, front.grown()) for front in fronts), key=defects)
+    tight = near & (radius < TIGHTEST * spacing[triangles].max(axis=1))
+    bends = _bends(best)
+    turns = bends[bends > SHARP].sum() / QUARTER
+    if not tight.any() or turns < (1 - SMOOTHER) * roughness(best):
+        return best
+    normals = sheet_normals(points, triangles[tight], radius[tight], best)
+    along = _along_sheets(points, normals, triangles[near], radius[near])
+    across = _largest_part(points, _Front(points, *along, BEND_COSTS[0], is_oriented=True).grown())
+    return across if roughness(across) < SMOOTHER * roughness(best) else best
+
+
+def _along_sheets(
+    points: FloatArray, normals: FloatArray, triangles: IntArray, radius: FloatArray
+) -> tuple[IntArray, FloatArray]:
+    """Triangles (T, 3) that face as the normals do, and sizes (T,) by which a front takes them.
+
+    Of the given ones (G, 3) with their radii (G,), and of those along the sheets.
+    """
+    more, more_radius = sheet_triangles(points, normals)
+    triangles, row = np.unique(np.concatenate([triangles, more]), axis=0, return_index=True)
+    radius = np.concatenate([radius, more_radius])[row]
+    facing = unit_normals(points, triangles)
+    cosine = (facing[:, None] * normals[triangles]).sum(axis=2)
+    is_against = cosine.sum(axis=1, keepdims=True) < 0
+    cosine = np.where(is_against, -cosine, cosine)
+    triangles = np.where(is_against, triangles[:, ::-1], triangles)
+    kept = cosine.min(axis=1) > AGAINST
+    return triangles[kept], (radius * (1 + DISAGREEMENT * (1 - cosine.mean(axis=1))))[kept]
 
 
 class _Front:
@@ -88,9 +135,7 @@ class _Front:
         is_oriented: bool = False,
     ) -> None:
         self.size, self.bend_cost, self.is_oriented = len(points), bend_cost, is_oriented
-        a, b, c = (points[triangles[:, k]] for k in range(3))
-        normals = np.cross(b - a, c - a)
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+        normals = unit_normals(points, triangles)
         self.seeds: list[int] = np.argsort(radius, kind="stable").tolist()
         self.corners: list[list[int]] = triangles.tolist()
         self.radii: list[float] = radius.tolist()
@@ -251,15 +296,28 @@ def _filled(points: FloatArray, faces: IntArray, loops: list[IntArray]) -> IntAr
 
 def defects(mesh: Mesh) -> int:
     """What a triangulation has of handles, boundary edges, folds and unused points, as a count."""
+    return _gaps(mesh) + int((_bends(mesh) > QUARTER).sum())
+
+
+def roughness(mesh: Mesh) -> float:
+    """As `defects`, with all bends in quarter turns in place of the folds.
+
+    A boundary edge counts as a half turn: a slit along a sharp rim is no smoother than the rim.
+    """
     boundary = int((mesh.edge_face_count == 1).sum())
-    return HANDLE * mesh.genus + boundary + _folds(mesh) + int((~mesh.referenced).sum())
+    return _gaps(mesh) + boundary + float(_bends(mesh).sum() / QUARTER)
 
 
-def _folds(mesh: Mesh) -> int:
-    """The number of edges at which the surface turns by more than a right angle."""
-    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
-    normals = np.cross(b - a, c - a)
+def _gaps(mesh: Mesh) -> int:
+    """Handles, boundary edges and unused points, as a count."""
+    boundary = int((mesh.edge_face_count == 1).sum())
+    return HANDLE * mesh.genus + boundary + int((~mesh.referenced).sum())
+
+
+def _bends(mesh: Mesh) -> FloatArray:
+    """The angles by which the surface turns at its inner edges, in radians."""
+    normals = unit_normals(mesh.vertices, mesh.faces)
     order = np.argsort(mesh.edge_of_halfedge, kind="stable")
     twin = np.diff(mesh.edge_of_halfedge[order]) == 0
     one, two = order[:-1][twin] // 3, order[1:][twin] // 3
-    return int(((normals[one] * normals[two]).sum(axis=1) < 0).sum())
+    return np.asarray(np.arccos(np.clip((normals[one] * normals[two]).sum(axis=1), -1, 1)))

@@ -116,6 +116,20 @@ def test_nothing_leaves_the_device_of_the_points(activation: str) -> None:
     assert {p.grad.device.type for p in net.parameters()} == {"meta"}
 
 
+@pytest.mark.parametrize("activation", ACTIVATIONS.values(), ids=ACTIVATIONS)
+def test_blocks_are_the_same_function(
+    activation: Activation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stack = Stack(2, 3, (5, 4), activation, generator()).double()
+    x = torch.randn(3, 7, 2, generator=generator(), dtype=torch.float64, requires_grad=True)
+    results = []
+    for rows in (100, 6):  # one block, and four of two points with their tangents
+        monkeypatch.setattr("parapoint.networks.BLOCK", rows)
+        made = stack(x)
+        results.append([made, *torch.autograd.grad(made.square().sum(), [x, *stack.layers])])
+    torch.testing.assert_close(*results)
+
+
 def test_no_points_are_mapped_to_none() -> None:
     with torch.no_grad():
         assert networks().parameterization(torch.zeros(0, 3)).shape == (0, 2)
