@@ -37,7 +37,7 @@ from parapoint.trainer import PRECISIONS, DivergedError, Step, Trainer, surface_
 
 logger = logging.getLogger("parapoint")
 
-FORMAT = 3
+FORMAT = 4
 """Version of saved models and checkpoints."""
 FEWEST_POINTS = 100
 """Distinct points that a fit needs."""

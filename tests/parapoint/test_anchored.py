@@ -58,5 +58,5 @@ def test_points_on_coinciding_anchors_have_finite_values_and_gradients() -> None
 
 def test_deform_alone_has_parameters() -> None:
     generator = torch.Generator().manual_seed(0)
-    net = AnchoredNetworks(50, (8,), 4, ACTIVATIONS["softplus"], generator)
+    net = AnchoredNetworks(50, (8,), 4, ACTIVATIONS["squareplus"], generator)
     assert {name.split(".")[0] for name, _ in net.named_parameters()} == {"deform"}

@@ -200,7 +200,7 @@ def test_a_model_of_another_version_or_a_damaged_one_is_one_line(fitted, tmp_pat
     fitted.save(tmp_path)
     text = (tmp_path / "model.json").read_text()
     (tmp_path / "model.json").write_text(json.dumps({**json.loads(text), "format": 99}))
-    with pytest.raises(InputError, match="format version 99; this parapoint reads version 3"):
+    with pytest.raises(InputError, match="format version 99; this parapoint reads version 4"):
         ParaPoint.load(tmp_path)
     (tmp_path / "model.json").write_text(text[:-20])
     with pytest.raises(InputError, match="damaged"):

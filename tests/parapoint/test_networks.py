@@ -21,7 +21,7 @@ def plain(stack: Stack, x: torch.Tensor) -> torch.Tensor:
     """A stack written with torch's own layers."""
     functions = {
         ACTIVATIONS["leaky_relu"]: lambda z: torch.nn.functional.leaky_relu(z, 0.01),
-        ACTIVATIONS["softplus"]: lambda z: torch.nn.functional.softplus(z, 10.0),
+        ACTIVATIONS["squareplus"]: lambda z: (z + (z * z + 0.04).sqrt()) / 2,
     }
     for i, layer in enumerate(stack.layers):
         x = x @ layer[:-1] + layer[-1]
@@ -130,6 +130,19 @@ def test_blocks_are_the_same_function(
     torch.testing.assert_close(*results)
 
 
+def test_far_from_zero_the_smooth_activation_is_finite() -> None:
+    z = torch.tensor([-1e6, -1e3, 0.0, 1e3, 1e6])[None, :, None].repeat(2, 1, 1)
+    z[1] = 1
+    ACTIVATIONS["squareplus"].push_(z)
+    gradient = torch.ones_like(z)
+    ACTIVATIONS["squareplus"].pull_(gradient, z)
+    expected = torch.tensor([[0, 0, 0.1, 1e3, 1e6], [0, 0, 0.5, 1, 1]])[:, :, None]
+    torch.testing.assert_close(z, expected, rtol=0, atol=1e-3)
+    # σ'' at 0 is 1 / (2 · width), and the tangent there is 1.
+    expected = torch.tensor([[0, 0, 3, 1, 1], [0, 0, 0.5, 1, 1]])[:, :, None]
+    torch.testing.assert_close(gradient, expected, rtol=0, atol=1e-3)
+
+
 def test_no_points_are_mapped_to_none() -> None:
     with torch.no_grad():
         assert networks().parameterization(torch.zeros(0, 3)).shape == (0, 2)
@@ -192,7 +205,7 @@ def test_bfloat16_is_for_training_alone_and_keeps_the_gradient_s_direction() -> 
 
 
 def test_tangents_of_the_surface_are_unfolded() -> None:
-    net = networks("softplus", hidden=(8,)).double()
+    net = networks("squareplus", hidden=(8,)).double()
     points = torch.randn(5, 3, generator=generator(), dtype=torch.float64)
     axes = torch.eye(3, dtype=torch.float64)[:2, None].expand(2, 5, 3)
     there, _ = net(torch.cat([points[None], axes]), None)
