@@ -23,6 +23,8 @@ from parapoint.surface import Mesh, PointCloud
 
 ANGLE, AREA = "angle_difference_mean", "area_discrepancy_total"
 FLIPPED, SPANNING = "flipped_fraction", "spanning_fraction"
+SHEETS = 12
+"""Most models of a report in which each has figures of its own, and all pictures for them."""
 ISOMETRIC = "symmetric_dirichlet"
 POINT_ANGLE, POINT_AREA = "local_quasi_conformal_mean", "local_area_log_ratio_mean"
 POINT_COLLISIONS, POINT_TEARS = "uv_collision_fraction", "spanning_point_fraction"
@@ -185,6 +187,8 @@ class Contents:
         rows: the latest row of each cell.
         labels: the label of each row, by its id.
         measured: one row a cell: case, label (short), seed, status, id, seconds, every metric.
+        is_large: whether the folder holds more than SHEETS models, all suites together: then few
+            have figures of their own, and pictures are small.
     """
 
     store: Store
@@ -192,6 +196,7 @@ class Contents:
     rows: tuple[ResultRow, ...]
     labels: Mapping[str, Label]
     measured: pd.DataFrame
+    is_large: bool
 
     @cached_property
     def cases(self) -> list[str]:
@@ -331,6 +336,7 @@ def contents(folder: Path) -> list[Contents]:
             "`python -m benchmarks run` writes them"
         )
     frame = store.metrics()
+    is_large = len({row.case for row in rows}) > SHEETS
     found = []
     for suite in dict.fromkeys(row.suite for row in rows):
         own = tuple(row for row in rows if row.suite == suite)
@@ -344,5 +350,5 @@ def contents(folder: Path) -> list[Contents]:
         )
         # A learned seam that faces span has no edges: 0 would read, and rank, as no seam at all.
         part.loc[part[SPANNING] > 0, ["seam_length", "seam_excess"]] = math.nan
-        found.append(Contents(store, suite, own, by_id, part))
+        found.append(Contents(store, suite, own, by_id, part, is_large))
     return found

@@ -25,7 +25,7 @@ from pypdf import PdfWriter
 
 from benchmarks.results import ResultRow
 from reports.clouds import DENSE, SPARSE
-from reports.contents import Contents
+from reports.contents import SHEETS, Contents
 from reports.galleries import (
     ablation,
     ablation_of_the_paper,
@@ -37,7 +37,7 @@ from reports.galleries import (
     maps,
     models,
 )
-from reports.pictures import SHEETS, known_keys, slug, source_hash
+from reports.pictures import known_keys, slug, source_hash
 from reports.plots import area_convergence, convergence, cost, losses, pareto, singular_values
 from reports.published import published_values
 from reports.style import STYLE
@@ -116,7 +116,7 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
     meshes = [case for case in cases if case not in contents.clouds]
     whole = [case for case in meshes if not is_cut(contents, case)]
     several = partial(paged, contents)
-    sheets = cases if len(cases) <= SHEETS else []
+    sheets = [] if contents.is_large else cases
     told = [case for case in cases if case in sheets or published_values(case)]
     as_points = [case for case in cases if case in told or case in contents.clouds]
 
@@ -147,7 +147,7 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
             f"checkerboard on {DENSE:,} points. (d) Green: points of the faces that span a learned "
             "seam. The uv of a point is interpolated in its face, or is that of the nearest corner "
             "where the face spans a seam: the results hold no network that could be asked. Of a "
-            f"suite of more than {SHEETS} meshes, those of the paper are shown. Where "
+            f"report of more than {SHEETS} models, those of the paper are shown. Where "
             "the model is a cloud itself, (c) shows its own points as disks, and (d) those where "
             "the map tears between neighbours.",
             make=partial(clouds, contents, pictures),
@@ -298,11 +298,11 @@ def draw(contents: Contents, pictures: Path, folder: Path, jobs: int) -> list[Dr
     planned = drawings(contents, pictures)
     for drawing in planned:
         states = [[row.id, row.status, row.uv_sha256, row.seconds] for row in drawing.rows]
-        text = f"{source} {json.dumps(states)}"
+        text = f"{source} {contents.is_large} {json.dumps(states)}"
         keys[drawing.name] = hashlib.sha256(text.encode()).hexdigest()[:16]
         if known.get(drawing.name) != keys[drawing.name]:
             changed.append(drawing)
-    make = partial(write, folder, len(contents.cases) > SHEETS)
+    make = partial(write, folder, contents.is_large)
     if jobs > 1 and len(changed) > 1:
         with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
             list(pool.map(make, changed))
@@ -310,6 +310,9 @@ def draw(contents: Contents, pictures: Path, folder: Path, jobs: int) -> list[Dr
         for drawing in changed:
             make(drawing)
     record.write_text(json.dumps(keys, indent=0, sort_keys=True) + "\n")
+    for name in known.keys() - keys.keys():  # of a folder that grew
+        for kind in ("pdf", "png"):
+            (folder / f"{name}.{kind}").unlink(missing_ok=True)
     drawn = [
         Drawn(one.name, one.title, one.caption)
         for one in planned

@@ -38,7 +38,7 @@ Content = Image | viewer.Script
 
 SIZE, SMALL, SAMPLES = 360, 280, 2
 """Longer side of a picture in pixels: what the largest figure of a model prints, and enough for the
-others, of suites with too many models for such figures; samples along a pixel.
+others, of reports with too many models for such figures; samples along a pixel.
 """
 
 FIELDS = 44
@@ -226,9 +226,6 @@ TEXTURED_PICTURES = ("checker-1", "checker-2", "layout")
 HEAT_PICTURES = ("angle", "angle-uv", "area", "area-uv")
 ARTIST_PICTURES = ("artist-checker-1", "artist-layout")
 CLOUD_PICTURES = ("cloud", "cloud-uv", "dense", "seams")
-SHEETS = 12
-"""Most models of a suite for which each has figures of its own, and all pictures for them."""
-
 VIEWED = "view"
 """Kind of the file beside the pictures that the viewer reads, of a model and of a map."""
 
@@ -241,7 +238,7 @@ def model_kinds(*, points: bool, artist: bool) -> tuple[str, ...]:
 def map_kinds(row: ResultRow, *, points: bool, with_heat: bool) -> tuple[str, ...]:
     """The files of a map, of `points` or of a mesh: of both, for the one method that sees points.
 
-    In a suite without the figures of a model the second view of other methods is in none, and only
+    In a report without the figures of a model the second view of other methods is in none, and only
     the paper's models are shown as points.
     """
     if points:
@@ -288,7 +285,7 @@ def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
     record = folder / "keys.json"
     known = known_keys(record)
     source = source_hash("render", "pictures", "clouds", "viewer")
-    with_heat = len(contents.cases) <= SHEETS
+    with_heat = not contents.is_large
     work: list[tuple[list[ResultRow], list[str]]] = []
     keys: dict[str, str] = {}
     for case in contents.cases:

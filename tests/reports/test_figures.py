@@ -6,6 +6,7 @@ import pytest
 from matplotlib.text import Text
 from pypdf import PdfReader
 
+from reports import contents as contents_module
 from reports import figures, galleries, plots
 from reports.contents import contents
 from reports.figures import draw, drawings, write
@@ -50,6 +51,24 @@ def test_figures_are_drawn_again_only_when_something_changed(suite, tmp_path, mo
     kept[0] = dataclasses.replace(kept[0], rows=kept[0].rows[:-1])
     draw(suite, tmp_path, tmp_path, 1)
     assert written == ["pareto", "losses", "pareto"]
+
+
+def test_a_large_report_has_no_figure_for_each_model_and_those_of_before_go(
+    results, tmp_path, monkeypatch
+):
+    small = contents(results)[0]
+    assert not small.is_large
+    monkeypatch.setattr(contents_module, "SHEETS", len(small.cases) - 1)
+    large = contents(results)[0]
+    assert large.is_large
+    (gone, *_) = [one for one in drawings(small, tmp_path) if one.name.startswith("maps-")]
+    assert gone.name not in [one.name for one in drawings(large, tmp_path)]
+    kept = [one for one in drawings(large, tmp_path) if one.name == "pareto"]
+    monkeypatch.setattr(figures, "drawings", lambda given, _: [gone] * (given is small) + kept)
+    draw(small, tmp_path, tmp_path, 1)
+    assert (tmp_path / f"{gone.name}.png").exists()
+    draw(large, tmp_path, tmp_path, 1)
+    assert sorted(file.name for file in tmp_path.glob("*.p*")) == ["pareto.pdf", "pareto.png"]
 
 
 def test_the_same_results_give_the_same_bytes(suite, tmp_path):
