@@ -171,7 +171,7 @@ def pareto(contents: Contents, cases: Sequence[str]) -> Figure | None:
         place.set_yscale("log")
         plain_log(place.yaxis)
         right = place.get_xlim()[1]
-        place.set_xlim(-0.04 * right, right)  # no marker is cut at 0
+        place.set_xlim(-0.04 * right, 1.04 * right)  # no marker is cut at either end
         place.set_title(case)
         place.set_xlabel("area discrepancy")
     places[0].set_ylabel("angle difference [rad]")
