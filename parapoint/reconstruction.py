@@ -304,14 +304,16 @@ def roughness(mesh: Mesh) -> float:
 
     A boundary edge counts as a half turn: a slit along a sharp rim is no smoother than the rim.
     """
-    boundary = int((mesh.edge_face_count == 1).sum())
-    return _gaps(mesh) + boundary + float(_bends(mesh).sum() / QUARTER)
+    return _gaps(mesh) + _boundary_edges(mesh) + float(_bends(mesh).sum() / QUARTER)
 
 
 def _gaps(mesh: Mesh) -> int:
     """Handles, boundary edges and unused points, as a count."""
-    boundary = int((mesh.edge_face_count == 1).sum())
-    return HANDLE * mesh.genus + boundary + int((~mesh.referenced).sum())
+    return HANDLE * mesh.genus + _boundary_edges(mesh) + int((~mesh.referenced).sum())
+
+
+def _boundary_edges(mesh: Mesh) -> int:
+    return int((mesh.edge_face_count == 1).sum())
 
 
 def _bends(mesh: Mesh) -> FloatArray:

@@ -84,10 +84,9 @@ def sheet_triangles(points: FloatArray, normals: FloatArray) -> tuple[IntArray, 
         i, j, k, offset, radius = i[fits], j[fits], k[fits], offset[fits], radius[fits]
         empty = np.ones(len(i), dtype=bool)
         for other in near[i].T:
-            inside = np.linalg.norm(points[other] - points[i] - offset, axis=1) < radius * (
-                1 - 1e-9
-            )
-            empty &= ~(inside & (other >= 0) & (other != j) & (other != k))
+            apart = np.linalg.norm(points[other] - points[i] - offset, axis=1)
+            inside = (apart < radius * (1 - 1e-9)) & (other >= 0)
+            empty &= ~inside | (other == j) | (other == k)
         found.append(np.sort(np.stack([i, j, k], axis=1)[empty], axis=1))
         radii.append(radius[empty])
     triangles, row, seen = np.unique(
