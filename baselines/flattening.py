@@ -48,9 +48,10 @@ def domain(surface: Surface) -> Domain:
     if not surface.referenced.all():
         row = np.cumsum(surface.referenced) - 1
         vertices, faces, loop = vertices[surface.referenced], row[faces], row[loop]
-    along = (faces == loop[0]) & (np.roll(faces, -1, axis=1) == loop[1])
+    a, b, c = faces.T
+    along = any(((i == loop[0]) & (j == loop[1])).any() for i, j in ((a, b), (b, c), (c, a)))
     area = float(igl.doublearea(vertices, faces).sum()) / 2
-    return Domain(vertices, faces, loop if along.any() else loop[::-1], area)
+    return Domain(vertices, faces, loop if along else loop[::-1], area)
 
 
 def closed_holes(disk: Domain) -> tuple[FloatArray, IntArray]:
@@ -108,8 +109,7 @@ def far_pair(points: FloatArray) -> tuple[int, int]:
 
 def signed_areas(uv: FloatArray, faces: IntArray) -> FloatArray:
     """(F,) area of each triangle in the plane, negative where it is turned over."""
-    (u1, v1), (u2, v2) = (uv[faces[:, k]].T - uv[faces[:, 0]].T for k in (1, 2))
-    return np.asarray((u1 * v2 - v1 * u2) / 2, dtype=np.float64)
+    return np.asarray(igl.doublearea(uv, faces) / 2, dtype=np.float64)
 
 
 def finite(uv: FloatArray) -> FloatArray:

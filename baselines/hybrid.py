@@ -23,10 +23,11 @@ from baselines.flattening import (
 from baselines.packing import by_component
 from baselines.slim import DENSITIES
 from baselines.tutte import tutte
+from parapoint import presets
 from parapoint.bijection import BijectionError, isometric_map
 from parapoint.cutting import cut_along, cut_to_disk, edge_graph, edge_lengths, path_to
 from parapoint.errors import InputError
-from parapoint.estimator import ParaPoint
+from parapoint.estimator import FEWEST_VERTICES, ParaPoint
 from parapoint.method import UnsupportedError
 from parapoint.parameterization import Parameterization
 from parapoint.spanning import learned_seam, unfolded
@@ -42,6 +43,8 @@ TRIAL_STEPS = 5
 """Steps of SLIM after which a longer seam is judged."""
 TRIALS = 3
 """The seam is as long as it should be once so many trials in a row do not pay."""
+POINTS_OF_A_FACE = 20
+"""Of a mesh with few faces so many points are sampled on each; the seam follows its edges."""
 MOST_BRANCHES = 10
 """The seam grows by so many branches at most."""
 
@@ -57,12 +60,13 @@ class ParaPointSLIM:
     that cross held where they are, so the map stays one to one. Then the seam grows to where the
     map is most distorted (X. Gu et al. 2002, "Geometry images"), as long as that pays.
 
-    A disk, with or without holes, is cut only where that pays.
+    A disk, with or without holes, is cut only where that pays; where its map without a cut is so
+    good that none could, ParaPoint is not fitted. Components are mapped one after another.
 
     Attributes:
         preset: of ParaPoint.
-        points: of ParaPoint; None for the preset's.
-        time_budget: of ParaPoint, in seconds; None for its own.
+        points: of ParaPoint; None for the preset's, or fewer for a mesh of few faces.
+        time_budget: of ParaPoint, in seconds for each component; None for its own.
         iterations: steps of SLIM, at least 1; the longer seam takes more.
         price: what the symmetric Dirichlet energy (4 at least) must fall by for each sqrt(area) of
             seam; None for the learned seam, no shorter and no longer.
@@ -97,7 +101,12 @@ class ParaPointSLIM:
         if not isinstance(surface, Mesh):
             raise UnsupportedError("needs faces; the surface is a point cloud")
         mesh = _sound(surface)
-        model = ParaPoint(self.preset, points=self.points, time_budget=self.time_budget)
+        whole = self._uncut(mesh)
+        if whole is not None and whole.energy - LEAST_ENERGY <= self._least_cost(mesh):
+            report = {**whole.report(), "learned_seam_edges": 0, "parapoint": "no cut could pay"}
+            return Parameterization(whole.uv, whole.mesh.faces, report=report)
+        points = self.points or _enough_points(mesh, presets.named(self.preset).points)
+        model = ParaPoint(self.preset, points=points, time_budget=self.time_budget)
         learned = model.parameterize(mesh, seed=seed)
         seam = learned_seam(mesh, learned.uv)
         run = _Run(cut_along(mesh, mesh.edges[seam]))
@@ -105,12 +114,8 @@ class ParaPointSLIM:
         run.improve(self.iterations)
         if self.price is not None:
             length = float(edge_lengths(mesh)[seam].sum()) / run.unit
-            if length > 0 and mesh.is_planar_domain:
-                whole = _Run(mesh)
-                whole.begin(None)
-                whole.improve(self.iterations)
-                if whole.energy <= run.energy + self.price * length:
-                    run, seam = whole, np.zeros_like(seam)
+            if whole is not None and whole.energy <= run.energy + self.price * length:
+                run, seam = whole, np.zeros_like(seam)
             run.lengthen(self.price)
         report = {
             **run.report(),
@@ -118,6 +123,23 @@ class ParaPointSLIM:
             "parapoint": dict(learned.report),
         }
         return Parameterization(run.uv, run.mesh.faces, report=report)
+
+    def _uncut(self, mesh: Mesh) -> _Run | None:
+        """SLIM without a cut, where the mesh has such a map and the price may be too high."""
+        if self.price is None or not mesh.is_planar_domain:
+            return None
+        run = _Run(mesh)
+        try:
+            run.begin(None)
+        except FlatteningError:
+            return None
+        run.improve(self.iterations)
+        return run
+
+    def _least_cost(self, mesh: Mesh) -> float:
+        """What the energy must fall by for the shortest cut there is, one edge."""
+        assert self.price is not None
+        return self.price * float(edge_lengths(mesh).min() / np.sqrt(mesh.face_areas.sum()))
 
 
 @dataclass(frozen=True)
@@ -360,6 +382,11 @@ def _sound(mesh: Mesh) -> Mesh:
     check_triangles(mesh.vertices, mesh.faces)
     used, faces = np.unique(mesh.faces, return_inverse=True)
     return Mesh(mesh.vertices[used], faces.reshape(-1, 3))
+
+
+def _enough_points(mesh: Mesh, most: int) -> int:
+    """Points that show where a mesh should open, at its edges: all vertices, or some a face."""
+    return min(most, max(FEWEST_VERTICES, POINTS_OF_A_FACE * len(mesh.faces)))
 
 
 def _check(iterations: int, price: float | None) -> None:

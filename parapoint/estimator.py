@@ -22,6 +22,7 @@ import torch
 from scipy.spatial import cKDTree
 from torch import Tensor
 
+from parapoint import presets
 from parapoint.anchored import AnchoredNetworks, Anchors
 from parapoint.charts import Chart, Charts
 from parapoint.components import components
@@ -30,7 +31,7 @@ from parapoint.flattening import FlatMap, flat_map
 from parapoint.losses import DISTORTIONS, EIGENVALUES
 from parapoint.networks import ACTIVATIONS, Networks, SubNetworks, SurfaceNetworks
 from parapoint.parameterization import Parameterization, PointParameterization, TracePoint
-from parapoint.presets import PRESETS, SMOOTH, Preset
+from parapoint.presets import SMOOTH, Preset
 from parapoint.reconstruction import ReconstructionError
 from parapoint.surface import BoolArray, FloatArray, Mesh, PointCloud, Surface
 from parapoint.trainer import PRECISIONS, DivergedError, Step, Trainer, surface_sample
@@ -562,8 +563,7 @@ class ParaPoint:
         Raises:
             InputError: a parameter is not as said.
         """
-        if self.preset not in PRESETS:
-            raise InputError(f"no preset {self.preset!r}; there are: {', '.join(PRESETS)}")
+        preset = presets.named(self.preset)
         for name, least in (
             ("points", FEWEST_POINTS),
             ("iterations", 1),
@@ -594,7 +594,7 @@ class ParaPoint:
             raise InputError(f"distortion_weight must be a number of at least 0, not {weight}")
         if not isinstance(self.seed, int) or self.seed < 0:
             raise InputError(f"seed must be a whole number of at least 0, not {self.seed}")
-        return self._with_parameters(PRESETS[self.preset]), _device(self.device)
+        return self._with_parameters(preset), _device(self.device)
 
     def _with_parameters(self, preset: Preset) -> Preset:
         """The preset with this model's parameters in it."""

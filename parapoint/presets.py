@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from parapoint.errors import InputError
+
 
 @dataclass(frozen=True)
 class Preset:
@@ -152,3 +154,14 @@ the paper in this:
 Where no map can be computed, `SMOOTH` is trained on the same points; the report says so."""
 
 PRESETS = {"paper": PAPER, "smooth": SMOOTH, "fast": FAST}
+
+
+def named(preset: str) -> Preset:
+    """The preset of that name.
+
+    Raises:
+        InputError: there is none.
+    """
+    if preset not in PRESETS:
+        raise InputError(f"no preset {preset!r}; there are: {', '.join(PRESETS)}")
+    return PRESETS[preset]

@@ -62,8 +62,11 @@ def edge_table(triangles: IntArray) -> tuple[IntArray, IntArray, IntArray]:
 
 def flat_faces(vertices: FloatArray, faces: IntArray) -> BoolArray:
     """(F,) which triangles have no area beyond rounding: no cotangent, gradient or normal."""
-    longest = igl.squared_edge_lengths(vertices, faces).max(axis=1)
-    flat = igl.doublearea(vertices, faces) <= 8 * np.finfo(np.float64).eps * longest
+    double_area, relative = igl.doublearea(vertices, faces), 8 * np.finfo(np.float64).eps
+    flat = double_area <= relative * 3 * np.ptp(vertices) ** 2  # no edge is as long as that
+    suspects = np.flatnonzero(flat)
+    longest = igl.squared_edge_lengths(vertices, faces[suspects]).max(axis=1, initial=0)
+    flat[suspects] = double_area[suspects] <= relative * longest
     return np.asarray(flat, dtype=bool)
 
 

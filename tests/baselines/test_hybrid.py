@@ -203,7 +203,35 @@ def test_the_artist_s_charts_are_kept_and_packed_apart():
     assert len(slit.uv) == len(disk.vertices)
 
 
+def test_parapoint_is_asked_only_where_a_cut_could_pay(monkeypatch):
+    asked = []
+
+    def stop(self, *_, **__):
+        asked.append(self.points)
+        raise InterruptedError
+
+    monkeypatch.setattr(hybrid.ParaPoint, "parameterize", stop)
+    bent, cap = irregular_disk(), builtin.sphere_cap(150, rings=5)
+    flat = Mesh(bent.vertices * [1, 1, 0], bent.faces)
+    made = registry.method("parapoint+slim")[1].parameterize(flat, seed=0)
+    assert made.report["learned_seam_edges"] == 0
+    assert_allclose(made.report["end_energy"], 4, atol=1e-4)
+    assert not asked
+    for spec, mesh in (
+        ("parapoint+slim", cap),
+        ("parapoint+slim(price=None)", flat),  # the learned seam, whatever it costs
+        ("parapoint+slim(points=150)", cap),
+        ("parapoint+slim(preset=paper)", builtin.sphere_cap(150, rings=30)),
+    ):
+        with pytest.raises(InterruptedError):
+            registry.method(spec)[1].parameterize(mesh, seed=0)
+    assert asked == [20 * len(cap.faces), 20 * len(flat.faces), 150, 10_000]
+    assert len(cap.faces) > 100 < len(flat.faces)
+
+
 def test_what_is_refused():
+    with pytest.raises(InputError, match="no preset 'slow'; there are: paper, smooth, fast"):
+        registry.method("parapoint+slim(preset=slow)")[1].parameterize(sphere(), seed=0)
     artist = registry.method("artist+slim")[1]
     with pytest.raises(UnsupportedError, match="needs a mesh that came with a UV map"):
         prepared(irregular_disk(), artist.requires)

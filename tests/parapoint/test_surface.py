@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from parapoint import InputError, Mesh, PointCloud
+from parapoint.surface import flat_faces
 
 TETRAHEDRON = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
 CORNERS = [[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
@@ -145,3 +146,14 @@ def test_bad_meshes_are_refused_in_one_line(vertices, faces, message):
 def test_bad_point_clouds_are_refused(points, normals, message):
     with pytest.raises(InputError, match=message):
         PointCloud(points, normals)
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e3])
+@pytest.mark.parametrize("size", [1.0, 1e-9])
+def test_flat_faces_are_told_by_their_own_edges(shift, size):
+    """A small face is not flat beside a large one, nor a thin one that has an area."""
+    large, small = np.array([[0, 0, 0], [1e6, 0, 0], [0, 1e6, 0]]), np.array(CORNERS[:3]) * 0.01
+    thin, line = [[0, 0, 0], [1, 0, 0], [2, 1e-6, 0]], [[0, 0, 0], [1, 1, 1], [3, 3, 3]]
+    vertices = (np.concatenate([large, small, thin, line, np.zeros((3, 3))]) + shift) * size
+    faces = np.arange(15).reshape(-1, 3)
+    assert flat_faces(vertices, faces).tolist() == [False, False, False, True, True]
