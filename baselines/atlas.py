@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 
 from baselines.flattening import FlatteningError
 from parapoint.parameterization import Parameterization
-from parapoint.surface import FloatArray, Mesh
+from parapoint.surface import FloatArray, IntArray, Mesh
 
 
 def atlas(
@@ -52,6 +55,25 @@ def atlas(
 
 def joined_corners(mesh: Mesh, uv: FloatArray) -> Parameterization:
     """The map with one row for all corners that have the same vertex and the same uv (F, 3, 2)."""
-    key = np.concatenate([mesh.faces.reshape(-1, 1), uv.reshape(-1, 2)], axis=1)
-    rows, corners = np.unique(key, axis=0, return_inverse=True)
-    return Parameterization(rows[:, 1:], corners.reshape(-1, 3))
+    rows = uv.reshape(-1, 2)
+    corners = row_numbers(mesh.faces.reshape(-1), rows @ [1, 1j])
+    return Parameterization(rows[first_rows(corners)], corners.reshape(-1, 3))
+
+
+def row_numbers(*columns: npt.NDArray[Any]) -> IntArray:
+    """(N,) a number for each distinct row of some columns (N,), 0, 1, ... as they first appear.
+
+    By hashing, which takes a tenth of the time of `np.unique(axis=0)`.
+    """
+    number, _ = pd.factorize(columns[0])
+    for column in columns[1:]:
+        code, values = pd.factorize(column)
+        number, _ = pd.factorize(number * len(values) + code)
+    return np.asarray(number, dtype=np.int64)
+
+
+def first_rows(number: IntArray) -> IntArray:
+    """(n,) the first row that has each of the numbers 0, 1, ..., n - 1; (N,) given."""
+    first = np.empty(int(number.max()) + 1, dtype=np.int64)
+    first[number[::-1]] = np.arange(len(number))[::-1]
+    return first

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 
-from baselines.atlas import joined_corners
+from baselines.atlas import joined_corners, row_numbers
 from baselines.flattening import FlatteningError, check_triangles, domain, scaled
 from baselines.optional import optional
 from parapoint.method import UnsupportedError
@@ -19,20 +19,10 @@ pymeshlab = optional(
 )
 
 
-class Filtered(NamedTuple):
-    """A mesh after a filter.
+def filtered(vertices: FloatArray, faces: IntArray, name: str, **options: object) -> Any:
+    """The MeshSet of these vertices and faces after a filter that makes texture coordinates.
 
-    Attributes:
-        triangles: (M, 3, 3) corner positions of each face.
-        uv: (V, 2), one a vertex, or (3M, 2), one a corner; as the filter makes them.
-    """
-
-    triangles: FloatArray
-    uv: FloatArray
-
-
-def filtered(vertices: FloatArray, faces: IntArray, name: str, **options: object) -> Filtered:
-    """The mesh of these vertices and faces after a filter that makes texture coordinates.
+    Arrays read from it die with it.
 
     Raises:
         UnsupportedError: pymeshlab is not installed.
@@ -44,11 +34,7 @@ def filtered(vertices: FloatArray, faces: IntArray, name: str, **options: object
         meshes.apply_filter(name, **options)
     except pymeshlab.PyMeshLabException as error:
         raise FlatteningError(" ".join(str(error).split())) from None
-    made = meshes.mesh(len(meshes) - 1)  # a filter that makes a new mesh appends it
-    by_vertex = made.has_vertex_tex_coord()
-    uv = made.vertex_tex_coord_matrix() if by_vertex else made.wedge_tex_coord_matrix()
-    # Copies: the arrays die with the MeshSet.
-    return Filtered(made.vertex_matrix()[made.face_matrix()], np.array(uv))
+    return meshes
 
 
 @dataclass(frozen=True)
@@ -85,8 +71,8 @@ def disk_map(surface: Surface, name: str) -> Parameterization:
     """
     disk = domain(surface)
     check_triangles(disk.vertices, disk.faces)
-    uv = filtered(disk.vertices, disk.faces, name).uv
-    return Parameterization(scaled(disk, uv), disk.faces)
+    made = filtered(disk.vertices, disk.faces, name)
+    return Parameterization(scaled(disk, made.current_mesh().vertex_tex_coord_matrix()), disk.faces)
 
 
 @dataclass(frozen=True)
@@ -127,9 +113,10 @@ class MeshLabVoronoi:
             "generate_voronoi_atlas_parametrization",
             regionnum=self.regions,
         )
-        face, turn = matched_faces(surface, made.triangles)
-        uv = made.uv.reshape(-1, 3, 2)[face]
-        uv = np.take_along_axis(uv, ((np.arange(3) + turn[:, None]) % 3)[:, :, None], axis=1)
+        atlas = made.mesh(len(made) - 1)  # this filter makes a new mesh
+        face, turn = matched_faces(surface, atlas.vertex_matrix(), atlas.face_matrix())
+        uv = atlas.wedge_tex_coord_matrix().reshape(-1, 3, 2)[face]
+        uv = uv[np.arange(len(uv))[:, None], (np.arange(3) + turn[:, None]) % 3]
         return joined_corners(surface, uv)
 
 
@@ -164,34 +151,34 @@ class MeshLabTriangles:
             textdim=self.page_size,
             border=self.border,
         )
-        return Parameterization(made.uv, np.arange(len(made.uv)).reshape(-1, 3))
+        uv = made.current_mesh().wedge_tex_coord_matrix()
+        return Parameterization(uv, np.arange(len(uv)).reshape(-1, 3))
 
 
-def matched_faces(mesh: Mesh, triangles: FloatArray) -> tuple[IntArray, IntArray]:
-    """(F,) row of `triangles` for each face of the mesh; (F,) which corner there is its corner 0.
+def matched_faces(mesh: Mesh, vertices: FloatArray, faces: IntArray) -> tuple[IntArray, IntArray]:
+    """(F,) row of `faces` for each face of the mesh; (F,) which corner there is its corner 0.
 
     The Voronoi atlas rounds positions to float32, merges equal vertices, repeats faces and returns
     them in an order of its own.
 
     Args:
         mesh: what went in.
-        triangles: (M, 3, 3) corner positions that came out.
+        vertices: (V, 3) positions that came out.
+        faces: (M, 3) faces that came out, rows of `vertices`.
 
     Raises:
         FlatteningError: a face of the mesh is not among them.
     """
-    both = np.concatenate([mesh.vertices[mesh.faces], triangles]).astype(np.float32)
-    _, point = np.unique(both.reshape(-1, 3), axis=0, return_inverse=True)
-    point = point.reshape(-1, 3)
-    first = point.argmin(axis=1)
-    turned = np.take_along_axis(point, (np.arange(3) + first[:, None]) % 3, axis=1)
-    _, triple = np.unique(turned, axis=0, return_inverse=True)
+    x, y, z = np.concatenate([mesh.vertices, vertices]).astype(np.float32).T
+    place = row_numbers(x, y, z)
+    corners = place[np.concatenate([mesh.faces, faces + len(mesh.vertices)])]
+    first = corners.argmin(axis=1)
+    turned = np.take_along_axis(corners, (np.arange(3) + first[:, None]) % 3, axis=1)
+    triple = row_numbers(*turned.T)
     count = len(mesh.faces)
-    wanted, came = triple.reshape(-1)[:count], triple.reshape(-1)[count:]
-    known, row = np.unique(came, return_index=True)
-    place = np.minimum(np.searchsorted(known, wanted), len(known) - 1)
-    lost = known[place] != wanted
-    if lost.any():
-        raise FlatteningError(f"MeshLab's atlas left out {int(lost.sum())} of {count} faces")
-    face = row[place]
+    row = np.full(int(triple.max()) + 1, -1)
+    row[triple[count:][::-1]] = np.arange(len(faces))[::-1]  # of repeated ones the first
+    face = row[triple[:count]]
+    if (lost := int((face < 0).sum())) > 0:
+        raise FlatteningError(f"MeshLab's atlas left out {lost} of {count} faces")
     return face, (first[count:][face] - first[:count]) % 3

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from baselines import registry
-from baselines.atlas import atlas
+from baselines.atlas import atlas, first_rows, row_numbers
 from baselines.flattening import FlatteningError, signed_areas
 from baselines.meshlab import matched_faces
 from baselines.optional import Missing, optional
@@ -106,6 +106,17 @@ def test_atlas_refuses_faces_that_are_not_the_mesh_s():
         atlas(mesh, corners=mesh.faces, **{**given, "uv": np.full((len(rows), 2), np.nan)})
 
 
+def test_rows_are_numbered_as_they_first_appear():
+    rows = np.random.default_rng(1).integers(-2, 3, size=(400, 3)) / 2
+    rows[::7] *= -1.0  # -0.0 equals 0.0
+    number = row_numbers(*rows.T)
+    first = first_rows(number)
+    assert_array_equal(rows[first][number], rows)
+    assert len(first) == len(np.unique(rows + 0.0, axis=0))
+    assert (np.diff(first) > 0).all()
+    assert_array_equal(number[first], np.arange(len(first)))
+
+
 def test_meshlab_faces_are_found_again():
     mesh = sphere()
     rng = np.random.default_rng(5)
@@ -113,11 +124,12 @@ def test_meshlab_faces_are_found_again():
     order = np.concatenate([order, order[:7]])  # some twice
     turn = rng.integers(0, 3, len(order))
     shuffled = mesh.faces[order][np.arange(len(order))[:, None], (np.arange(3) + turn[:, None]) % 3]
-    face, first = matched_faces(mesh, mesh.vertices[shuffled])
+    face, first = matched_faces(mesh, mesh.vertices, shuffled)
     again = shuffled[face][np.arange(len(face))[:, None], (np.arange(3) + first[:, None]) % 3]
     assert_array_equal(again, mesh.faces)
+    assert (face < len(mesh.faces)).all()  # the first of those that stand twice
     with pytest.raises(FlatteningError, match=f"left out 1 of {len(mesh.faces)} faces"):
-        matched_faces(mesh, mesh.vertices[mesh.faces[1:]])
+        matched_faces(mesh, mesh.vertices, mesh.faces[1:])
 
 
 def test_meshlab_voronoi_maps_faces_in_order():
