@@ -333,9 +333,9 @@ class Clock:
 def test_a_time_budget_allows_as_many_computed_points_as_the_first_map_shows(monkeypatch) -> None:
     clock = Clock(monkeypatch, pace=0.004)
     model = ParaPoint(**FAST, time_budget=4.0).fit(paraboloid(700))
-    # 200 points take 0.8 s; the descents end after 3.2 s, and 40 % of what is left are planned.
-    assert clock.counts == [200, 240]
-    assert model.report_["anchors"] == model.report_["points"] == 240
+    # 200 points take 0.8 s; the descents end after 3.2 s, and 55 % of what is left are planned.
+    assert clock.counts == [200, 330]
+    assert model.report_["anchors"] == model.report_["points"] == 330
     assert not model.report_["cut_short"]
 
 
@@ -351,14 +351,14 @@ def sheared(flat: FlatMap) -> FlatMap:
     return flat._replace(uv=flat.uv @ shear, jacobians=shear @ flat.jacobians)
 
 
-@pytest.mark.parametrize(("change", "points"), [(lambda flat: flat, 240), (sheared, 200)])
+@pytest.mark.parametrize(("change", "points"), [(lambda flat: flat, 330), (sheared, 200)])
 def test_a_map_that_is_cut_short_stays_where_it_is_the_better(
     change, points: int, monkeypatch, caplog
 ) -> None:
     clock = Clock(monkeypatch, pace=0.004, slow=0.1)
     clock.change = change
     model = ParaPoint(**FAST, time_budget=4.0).fit(paraboloid(700) * [1, 1, 0])
-    assert clock.counts == [200, 240]
+    assert clock.counts == [200, 330]
     assert model.report_["points"] == model.report_["anchors"] == points
     assert model.report_["cut_short"]
     assert f"the time was up before the map was at its best; it is of {points}" in caplog.text
@@ -371,7 +371,7 @@ def test_a_second_map_that_fails_leaves_the_first(monkeypatch, caplog) -> None:
     Clock(monkeypatch, pace=0.004).change = failed
     model = ParaPoint(**FAST, time_budget=4.0).fit(paraboloid(700))
     assert model.report_["points"] == model.report_["anchors"] == 200
-    assert "no map of 240 points could be computed: no surface" in caplog.text
+    assert "no map of 330 points could be computed: no surface" in caplog.text
 
 
 def test_a_budget_that_is_spent_at_once_still_gives_a_map() -> None:
@@ -448,7 +448,7 @@ def test_the_time_that_remains_is_told_by_the_pace_of_the_steps(monkeypatch) -> 
     told.clear()
     clock.now, clock.counts = 100.0, []
     ParaPoint(**{**FAST, "iterations": 100}, time_budget=2.0).fit(paraboloid(700), callback=tell)
-    assert told[1] == pytest.approx(2.0 - 0.4 - 0.48 - 0.5)  # two maps and a step
+    assert told[1] == pytest.approx(2.0 - 0.4 - 0.66 - 0.5)  # two maps and a step
 
 
 def test_the_report_and_the_trace_say_what_was_done() -> None:
