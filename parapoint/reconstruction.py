@@ -26,8 +26,8 @@ from scipy.sparse import csgraph
 from scipy.spatial import QhullError, cKDTree
 
 from parapoint.delaunay import delaunay_complex, empty_radii, insideness
-from parapoint.sheets import sheet_normals, sheet_triangles, unit_normals
-from parapoint.surface import FloatArray, IntArray, Mesh, edge_table
+from parapoint.sheets import sheet_normals, sheet_triangles
+from parapoint.surface import FloatArray, IntArray, Mesh, edge_table, unit_normals
 
 Vector = tuple[float, float, float]
 

@@ -17,7 +17,7 @@ from scipy import sparse
 from scipy.sparse.linalg import cg
 from scipy.spatial import cKDTree
 
-from parapoint.surface import FloatArray, IntArray, Mesh, edge_table
+from parapoint.surface import FloatArray, IntArray, Mesh, edge_table, unit_normals
 
 AGREEMENT = 4
 """Triangles at a point agree on a normal by this power of the cosine between theirs and it."""
@@ -180,10 +180,3 @@ def _signs(points: FloatArray, normals: FloatArray, triangles: IntArray, mesh: M
 def _powered(cosine: FloatArray) -> FloatArray:
     """The power of a cosine by which it counts, with its sign."""
     return np.asarray(np.sign(cosine) * np.abs(cosine) ** LIKENESS)
-
-
-def unit_normals(points: FloatArray, triangles: IntArray) -> FloatArray:
-    """(T, 3) unit normals of triangles (T, 3); 0 of those without area."""
-    a, b, c = (points[triangles[:, k]] for k in range(3))
-    normals = np.cross(b - a, c - a)
-    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300))

@@ -70,6 +70,13 @@ def flat_faces(vertices: FloatArray, faces: IntArray) -> BoolArray:
     return np.asarray(flat, dtype=bool)
 
 
+def unit_normals(points: FloatArray, triangles: IntArray) -> FloatArray:
+    """(T, 3) unit normals of triangles (T, 3); 0 of those without area."""
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300))
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """A triangle mesh.
