@@ -3,8 +3,9 @@
 FLOPs are counted from the sizes of the layers, and rates are over processor time, all threads
 together, best of several runs: on a busy machine it does not count the time in which others ran.
 Each row stands against a large matrix product and against the bare products of its own layers,
-forward and backward, measured in the same run. The second is what a step can reach at all: cache
-misses at these sizes take a fifth of the large product's rate before anything else is done.
+forward and backward, all three measured in turn, as a processor's rate drifts. The second is what a
+step can reach at all: cache misses at these sizes take a fifth of the large product's rate before
+anything else is done.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
+import numpy as np
 from rich.table import Table
 
 PRODUCT = 2048
@@ -49,7 +51,6 @@ class Rate(NamedTuple):
 
 def training_rates() -> list[Rate]:
     """The matrix product, training steps of two presets, and the mapping of 250,000 points."""
-    import numpy as np
     import torch
 
     from parapoint.estimator import BATCH, ParaPoint
@@ -58,13 +59,16 @@ def training_rates() -> list[Rate]:
     from parapoint.trainer import Trainer
 
     left = torch.rand(PRODUCT, PRODUCT)
-    seconds, cpu = _best(lambda: left @ left, 5)
-    peak = 2 * PRODUCT**3 / cpu
-    rows = [Rate(f"matrix product, {PRODUCT} x {PRODUCT}", seconds, cpu, peak / 1e9, 1.0, np.nan)]
+    product, of_product = partial(torch.mm, left, left), 2 * PRODUCT**3
+    ((seconds, cpu),) = _best([product], 5)
+    what = f"matrix product, {PRODUCT} x {PRODUCT}"
+    rows = [Rate(what, seconds, cpu, of_product / cpu / 1e9, 1.0, np.nan)]
 
-    def add(what: str, times: tuple[float, float], operations: float, bare: float) -> None:
-        rate = operations / times[1]
-        rows.append(Rate(what, *times, rate / 1e9, rate / peak, rate / bare))
+    def add(what: str, run: Callable[[], object], operations: float, layers: Products) -> None:
+        own, large, bare = _best([run, product, layers.run], 5)
+        rate = operations / own[1]
+        peak, reachable = of_product / large[1], layers.operations / bare[1]
+        rows.append(Rate(what, *own, rate / 1e9, rate / peak, rate / reachable))
 
     points = np.random.default_rng(0).normal(size=(max(STEPS), 3))
     points /= np.linalg.norm(points, axis=1, keepdims=True)
@@ -77,20 +81,15 @@ def training_rates() -> list[Rate]:
             there, back = products(trainer.networks, tangents=len(trainer.shape) - 1)
             lattice = round(count**0.5) ** 2
             operations = 3 * 2 * (there * count + back * lattice)  # the backward pass is two more
-            bare = _bare_rate(numbers.hidden, 3 * (count + lattice), backward=True)  # as in Wrap
-            add(
-                f"step of {preset}, {count} points",
-                _best(partial(next, steps), 5),
-                operations,
-                bare,
-            )
+            layers = _products(numbers.hidden, 3 * (count + lattice), backward=True)  # as in Wrap
+            add(f"step of {preset}, {count} points", partial(next, steps), operations, layers)
         model = ParaPoint(preset=preset, iterations=1, points=256, device="cpu").fit(points)
         assert isinstance(model.networks_, SubNetworks)
         dense = np.resize(points, (MAPPED, 3))
         operations = 2 * MAPPED * (cost(model.networks_.cut) + cost(model.networks_.unwrap))
-        bare = _bare_rate(numbers.hidden, BATCH["cpu"], backward=False)
-        times = _best(partial(model.transform, dense), 2)
-        add(f"mapping of {MAPPED:,} points, {preset}", times, operations, bare)
+        layers = _products(numbers.hidden, BATCH["cpu"], backward=False)
+        mapping = partial(model.transform, dense)
+        add(f"mapping of {MAPPED:,} points, {preset}", mapping, operations, layers)
     return rows
 
 
@@ -105,31 +104,44 @@ def training_table() -> Table:
     return table
 
 
-def _bare_rate(hidden: tuple[int, ...], rows: int, *, backward: bool) -> float:
-    """FLOPs a second of processor time of the products of a stack 3 → 3 at so many rows."""
+class Products(NamedTuple):
+    """The bare products of a stack.
+
+    Attributes:
+        run: takes them.
+        operations: FLOPs that it takes.
+    """
+
+    run: Callable[[], None]
+    operations: float
+
+
+def _products(hidden: tuple[int, ...], rows: int, *, backward: bool) -> Products:
+    """The products of a stack 3 → 3 at so many rows."""
     import torch
 
     sizes = list(itertools.pairwise((3, *hidden, 3)))
     layers = [(torch.rand(rows, i), torch.rand(o, i), torch.rand(rows, o)) for i, o in sizes]
 
-    def products() -> None:
+    def run() -> None:
         for x, weight, gradient in layers:
             weight @ x.t()
             if backward:
                 weight.t() @ gradient.t()
                 x.t() @ gradient
 
-    operations = 2 * rows * sum(i * o for i, o in sizes) * (3 if backward else 1)
-    return operations / _best(products, 5)[1]
+    return Products(run, 2 * rows * sum(i * o for i, o in sizes) * (3 if backward else 1))
 
 
-def _best(run: Callable[[], object], repeats: int) -> tuple[float, float]:
-    """The shortest wall and processor times of `repeats` runs, after one that is not counted."""
-    run()
-    times = []
-    for _ in range(repeats):
-        begin = time.perf_counter(), time.process_time()
-        run()
-        times.append((time.perf_counter() - begin[0], time.process_time() - begin[1]))
-    wall, processor = zip(*times, strict=True)
-    return min(wall), min(processor)
+def _best(runs: list[Callable[[], object]], rounds: int) -> list[tuple[float, float]]:
+    """The shortest wall and processor times of each of `runs`, which are taken in turn.
+
+    After one round that is not counted.
+    """
+    times = np.empty((rounds + 1, len(runs), 2))
+    for one_round in times:
+        for run, taken in zip(runs, one_round, strict=True):
+            begin = time.perf_counter(), time.process_time()
+            run()
+            taken[:] = time.perf_counter() - begin[0], time.process_time() - begin[1]
+    return [(float(wall), float(cpu)) for wall, cpu in times[1:].min(axis=0)]
