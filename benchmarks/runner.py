@@ -18,9 +18,10 @@ from typing import Any, cast
 
 from baselines import registry
 from benchmarks import environment, executors, models
-from benchmarks.executors import WORKER_LOST, Executor, Task
+from benchmarks.cluster import WORKER_LOST
 from benchmarks.results import MISSING, SOURCE_CHANGED, ResultRow, Store, identity, plain
 from benchmarks.suites import Suite
+from benchmarks.tasks import Executor, Task
 from parapoint import files
 from parapoint.errors import InputError
 from parapoint.files import faults_of, read_parameterized

@@ -16,7 +16,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from benchmarks import environment, executors, runner
+from benchmarks import cluster, environment, executors, runner
 from benchmarks.results import Store
 from benchmarks.suites import Suite
 from parapoint.errors import InputError
@@ -166,7 +166,7 @@ def test_a_run_on_two_workers_one_of_which_dies_gives_the_rows_of_a_local_one(
 
 def test_a_worker_of_another_version_ends_the_run_in_words():
     with pytest.raises(InputError, match="has another version of the project"):
-        executors.performed({}, {}, [], 1, "another", modules=())
+        cluster.performed({}, {}, [], 1, "another", modules=())
 
 
 def test_a_cell_that_lost_two_workers_runs_again_next_time(tmp_path, monkeypatch):
@@ -175,7 +175,7 @@ def test_a_cell_that_lost_two_workers_runs_again_next_time(tmp_path, monkeypatch
     class Lost(executors.Local):
         def run(self, tasks, _):
             for task in tasks:
-                outcome = {"status": "failed", "reason": executors.WORKER_LOST, "took": 0.0}
+                outcome = {"status": "failed", "reason": cluster.WORKER_LOST, "took": 0.0}
                 task.ended(outcome, "", Path())
 
     with monkeypatch.context() as patch:
@@ -206,7 +206,7 @@ def test_a_missing_package_is_said_with_how_to_get_it(tmp_path, monkeypatch):
 
 
 def test_a_scheduler_that_does_not_answer_is_one_line(tmp_path, monkeypatch):
-    monkeypatch.setattr(executors, "CONNECT_SECONDS", 0.2)
+    monkeypatch.setattr(cluster, "CONNECT_SECONDS", 0.2)
     hands = executors.executor("dask://127.0.0.1:9", tmp_path, jobs=1, memory=1, tick=lambda: None)
     with pytest.raises(InputError, match="no dask scheduler answers"), hands:
         pass
