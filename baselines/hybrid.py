@@ -43,8 +43,9 @@ TRIAL_STEPS = 5
 """Steps of SLIM after which a longer seam is judged."""
 TRIALS = 3
 """The seam is as long as it should be once so many trials in a row do not pay."""
-POINTS_OF_A_FACE = 20
-"""Of a mesh with few faces so many points are sampled on each; the seam follows its edges."""
+POINTS_OF_A_FACE = 100
+"""Of a mesh with few faces so many points are sampled on each. Along the seams of a fish of 220
+faces the energy is 4.65 to 5.02 (three seeds) with 20,000 points, 5.45 to 6.07 with 2,000."""
 MOST_BRANCHES = 10
 """The seam grows by so many branches at most."""
 
