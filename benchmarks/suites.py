@@ -108,7 +108,7 @@ SUITES: dict[str, Suite] = {
             "paper",
             "The supplement's comparison: five disks and nefertiti",
             PAPER_CASES,
-            ("tutte", "lscm", ISOMETRIC, ONE_ITERATION, CONFORMAL, "xatlas", PAPER_REDUCED),
+            ("tutte", "lscm", ISOMETRIC, ONE_ITERATION, CONFORMAL, "xatlas", PAPER_REDUCED, FAST),
         ),
         Suite("disk", "Disks", members("disk"), (*MESH_METHODS, FAST)),
         Suite("closed", "Closed surfaces of genus 0", members("closed"), (*MESH_METHODS, FAST)),
