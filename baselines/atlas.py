@@ -65,9 +65,9 @@ def row_numbers(*columns: npt.NDArray[Any]) -> IntArray:
 
     By hashing, which takes a tenth of the time of `np.unique(axis=0)`.
     """
-    number, _ = pd.factorize(columns[0])
+    number, _ = pd.factorize(columns[0], use_na_sentinel=False)
     for column in columns[1:]:
-        code, values = pd.factorize(column)
+        code, values = pd.factorize(column, use_na_sentinel=False)
         number, _ = pd.factorize(number * len(values) + code)
     return np.asarray(number, dtype=np.int64)
 

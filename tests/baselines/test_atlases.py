@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from baselines import registry
-from baselines.atlas import atlas, first_rows, row_numbers
+from baselines.atlas import atlas, first_rows, joined_corners, row_numbers
 from baselines.flattening import FlatteningError, signed_areas
 from baselines.meshlab import matched_faces
 from baselines.optional import Missing, optional
@@ -115,6 +115,16 @@ def test_rows_are_numbered_as_they_first_appear():
     assert len(first) == len(np.unique(rows + 0.0, axis=0))
     assert (np.diff(first) > 0).all()
     assert_array_equal(number[first], np.arange(len(first)))
+
+
+def test_a_corner_that_is_not_finite_is_not_joined_with_another():
+    mesh = irregular_disk()
+    uv = mesh.vertices[mesh.faces][:, :, :2]
+    assert len(joined_corners(mesh, uv).uv) == len(mesh.vertices)
+    number = row_numbers(mesh.faces.reshape(-1)).reshape(-1, 3)
+    uv[number == number.max()] = np.nan  # of the vertex that comes last
+    with pytest.raises(InputError, match="uv must be finite"):
+        joined_corners(mesh, uv)
 
 
 def test_meshlab_faces_are_found_again():
