@@ -27,9 +27,10 @@ from parapoint import presets
 from parapoint.bijection import BijectionError, isometric_map
 from parapoint.cutting import cut_along, cut_to_disk, edge_graph, edge_lengths, path_to
 from parapoint.errors import InputError
-from parapoint.estimator import FEWEST_VERTICES, ParaPoint
+from parapoint.estimator import ParaPoint
 from parapoint.method import UnsupportedError
 from parapoint.parameterization import Parameterization
+from parapoint.sampling import FEWEST_VERTICES
 from parapoint.spanning import learned_seam, unfolded
 from parapoint.surface import FloatArray, IntArray, Mesh, Surface
 

@@ -11,10 +11,10 @@ import torch
 from scipy.spatial import cKDTree
 
 from parapoint.errors import InputError
-from parapoint.estimator import training_points
 from parapoint.networks import SurfaceNetworks
 from parapoint.parameterization import Parameterization, PointParameterization, TracePoint
 from parapoint.presets import Preset
+from parapoint.sampling import training_points
 from parapoint.surface import FloatArray, Mesh, Surface
 from parapoint.trainer import Trainer
 

@@ -53,8 +53,9 @@ def race(case: str, seconds: float, *, seed: int = 0) -> Iterator[Reached]:
     Raises:
         InputError: there is no such model, or it is no mesh.
     """
-    from parapoint.estimator import ParaPoint, training_points
+    from parapoint.estimator import ParaPoint
     from parapoint.presets import PAPER
+    from parapoint.sampling import training_points
 
     mesh = models.load(case)
     if not isinstance(mesh, Mesh):

@@ -16,13 +16,10 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
-import safetensors
-import safetensors.torch
 import torch
 from scipy.spatial import cKDTree
-from torch import Tensor
 
-from parapoint import presets
+from parapoint import presets, saving
 from parapoint.anchored import AnchoredNetworks, Anchors
 from parapoint.charts import Chart, Charts
 from parapoint.components import components
@@ -33,17 +30,12 @@ from parapoint.networks import ACTIVATIONS, Networks, SubNetworks, SurfaceNetwor
 from parapoint.parameterization import Parameterization, PointParameterization, TracePoint
 from parapoint.presets import SMOOTH, Preset
 from parapoint.reconstruction import ReconstructionError
+from parapoint.sampling import FEWEST_POINTS, rows_left_out, training_points
 from parapoint.surface import BoolArray, FloatArray, Mesh, PointCloud, Surface
-from parapoint.trainer import PRECISIONS, DivergedError, Step, Trainer, surface_sample
+from parapoint.trainer import PRECISIONS, DivergedError, Step, Trainer
 
 logger = logging.getLogger("parapoint")
 
-FORMAT = 4
-"""Version of saved models and checkpoints."""
-FEWEST_POINTS = 100
-"""Distinct points that a fit needs."""
-FEWEST_VERTICES = 2_000
-"""A mesh of fewer vertices is sampled on its faces instead: its vertices alone do not show it."""
 BATCH = {"cpu": 2_048, "cuda": 65_536}
 """Points mapped at a time: on a CPU the layers of so many stay in its cache."""
 TRIAL_PER_SECOND = 50
@@ -56,9 +48,6 @@ DESCENDING = 0.8
 """Share of the budget after which a computed map is improved no more."""
 COINCIDENT = 1e-6
 """Points of a computed map that agree to this, in radii of the cloud, count as one."""
-MOST_COMPARED = 1_000_000
-"""Rows of a cloud among which repetitions are counted."""
-CHECKPOINT_SECONDS = 60.0
 KEPT_MAPS = 8
 """Maps kept in the trace of `parameterize`."""
 MOST_KEPT_ROWS = 50_000
@@ -275,7 +264,7 @@ class ParaPoint:
             InputError: nothing is fitted.
         """
         self._check_fitted()
-        tensors = dict(self.networks_.state_dict())
+        tensors = {**self.networks_.state_dict(), "fitted": torch.from_numpy(self.points_)}
         facts = {
             "parameters": self.get_params(),
             "preset": dataclasses.asdict(self.preset_),
@@ -285,7 +274,7 @@ class ParaPoint:
             "charts": self.charts_,
             "trace": [[t.iteration, t.seconds, dict(t.values)] for t in self.trace_],
         }
-        _write(Path(folder), "model", {**tensors, "fitted": torch.from_numpy(self.points_)}, facts)
+        saving.write(Path(folder), "model", tensors, facts)
 
     @classmethod
     def load(cls, folder: str | Path, *, device: str = "auto") -> Self:
@@ -294,8 +283,8 @@ class ParaPoint:
         Raises:
             InputError: there is none, it is damaged, or of another version of the format.
         """
-        tensors, facts = _read(Path(folder), "model")
-        with _damage_of(Path(folder)):
+        tensors, facts = saving.read(Path(folder), "model")
+        with saving.damage_of(Path(folder)):
             model = cls(**{**facts["parameters"], "device": device})
             model.preset_ = _preset_from(facts["preset"])
             model.points_ = tensors.pop("fitted").numpy()
@@ -325,7 +314,7 @@ class ParaPoint:
         begun = time.monotonic()
         self.preset_, device = self._checked()
         surface = _surface(surface)
-        left_out = _left_out(surface)
+        left_out = rows_left_out(surface)
         if self.components != "together":
             parts = components(surface)
             if self.components == "each" and len(parts) > 1:
@@ -354,7 +343,7 @@ class ParaPoint:
             self.trace_: tuple[TracePoint, ...] = ()
             store = None
             if checkpoint is not None and (start is None or self.time_budget is None):
-                store = _Checkpoint(Path(checkpoint), self._identity())
+                store = saving.Checkpoint(Path(checkpoint), self._identity())
             if store is not None and (state := store.read()) is not None:
                 tensors, facts = state
                 trainer.resume(tensors, facts["trainer"])
@@ -620,48 +609,6 @@ class ParaPoint:
             yield BATCH[device.type], device
 
 
-def training_points(surface: Surface, count: int, seed: int) -> FloatArray:
-    """(n, 3) distinct training points: at most `count`, drawn evenly without repetition.
-
-    Of a cloud, from its points; of a mesh, from the vertices of its faces, or from the faces by
-    area where it has fewer than 2,000 vertices.
-
-    Raises:
-        InputError: fewer than 100 distinct points, or all on a line.
-    """
-    rng = np.random.default_rng(seed)
-    if isinstance(surface, Mesh):
-        points = surface.vertices[surface.referenced]
-        if len(points) < FEWEST_VERTICES and surface.face_areas.sum() > 0:
-            points = surface_sample(surface.vertices, surface.faces, count, seed)
-    else:
-        points = surface.points
-    if len(points) > 10 * count:
-        # Repetitions are looked for in a part: sorting millions of rows takes long.
-        points = points[np.sort(rng.choice(len(points), 10 * count, replace=False))]
-    distinct = np.unique(points, axis=0)
-    if len(distinct) < FEWEST_POINTS:
-        raise InputError(f"{len(distinct)} distinct points; a fit needs at least {FEWEST_POINTS}")
-    spread = np.linalg.svd(distinct - distinct.mean(axis=0), compute_uv=False)
-    if spread[1] <= 1e-6 * spread[0]:
-        raise InputError("all points lie on a line; a fit needs points of a surface")
-    if len(distinct) > count:
-        distinct = distinct[np.sort(rng.choice(len(distinct), count, replace=False))]
-    return np.ascontiguousarray(distinct)
-
-
-def _left_out(surface: Surface) -> dict[str, object]:
-    """How many rows of a cloud were not finite, and how many repeat others (of a million)."""
-    if isinstance(surface, Mesh):
-        return {"dropped_not_finite": 0, "dropped_duplicates": 0}
-    points = surface.points[:MOST_COMPARED]
-    ordered = points[np.lexsort(points.T)]
-    repeated = int((ordered[1:] == ordered[:-1]).all(axis=1).sum())
-    if repeated:
-        logger.warning("%d of %d points repeat others and count once", repeated, len(points))
-    return {"dropped_not_finite": surface.dropped, "dropped_duplicates": repeated}
-
-
 def _coordinates(values: npt.ArrayLike | Surface, columns: int) -> FloatArray:
     """The (N, columns) finite coordinates of a surface or an array."""
     if isinstance(values, Mesh):
@@ -754,100 +701,3 @@ def _conformality(flat: FlatMap) -> float:
 def _preset_from(facts: dict[str, Any]) -> Preset:
     """A preset from JSON, where tuples are lists."""
     return Preset(**{**facts, "hidden": tuple(facts["hidden"])})
-
-
-def _write(folder: Path, stem: str, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
-    """Write `stem.json` and the tensors it names, so that a kill leaves the old pair or the new."""
-    folder.mkdir(parents=True, exist_ok=True)
-    data = safetensors.torch.save({k: t.contiguous().cpu() for k, t in tensors.items()})
-    name = f"{stem}-{hashlib.sha256(data).hexdigest()[:16]}.safetensors"
-    text = json.dumps({"format": FORMAT, "tensors": name, **facts}, indent=1)
-    for path, content in ((folder / name, data), (folder / f"{stem}.json", text.encode())):
-        temporary = path.with_name(path.name + ".part")
-        temporary.write_bytes(content)
-        temporary.replace(path)
-    for old in folder.glob(f"{stem}-*.safetensors"):
-        if old.name != name:
-            old.unlink()
-
-
-def _read(folder: Path, stem: str) -> tuple[dict[str, Tensor], dict[str, Any]]:
-    """What `_write` wrote.
-
-    Raises:
-        InputError: there is no such pair, it is damaged, or of another version.
-    """
-    path = folder / f"{stem}.json"
-    if not path.is_file():
-        raise InputError(f"{folder}: no saved model here ({stem}.json is missing)")
-    with _damage_of(folder):
-        facts = json.loads(path.read_text())
-        version = facts["format"]
-    if version != FORMAT:
-        raise InputError(
-            f"{path}: format version {version}; this parapoint reads version {FORMAT}: fit anew"
-        )
-    with _damage_of(folder):
-        name = facts["tensors"]
-        if Path(name).name != name:
-            raise InputError(f"{path}: names tensors outside of its folder: {name!r}")
-        return safetensors.torch.load((folder / name).read_bytes()), facts
-
-
-@contextmanager
-def _damage_of(folder: Path) -> Iterator[None]:
-    """Turns what a damaged file causes into an InputError that names the folder."""
-    try:
-        yield
-    except (
-        KeyError,
-        TypeError,
-        ValueError,
-        OSError,
-        RuntimeError,
-        safetensors.SafetensorError,
-    ) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{folder}: damaged, fit anew or delete it ({error})") from error
-
-
-class _Checkpoint:
-    """The state of a run in a folder, written each minute."""
-
-    def __init__(self, folder: Path, identity: str) -> None:
-        self.folder, self.identity = folder, identity
-        self.written = time.monotonic()
-
-    def read(self) -> tuple[dict[str, Tensor], dict[str, Any]] | None:
-        """The state of an earlier session of this run, None where there is none.
-
-        Raises:
-            InputError: the state is of another run, of another version, or damaged.
-        """
-        if not (self.folder / "checkpoint.json").is_file():
-            return None
-        tensors, facts = _read(self.folder, "checkpoint")
-        if facts.get("identity") != self.identity:
-            raise InputError(
-                f"{self.folder}: holds the checkpoint of a run with other points or settings; "
-                "delete it or choose another folder"
-            )
-        return tensors, facts
-
-    def write_each_minute(self, trainer: Trainer, trace: tuple[TracePoint, ...]) -> None:
-        """Write the state if the last one is a minute old. Maps in the trace are not kept."""
-        if time.monotonic() - self.written < CHECKPOINT_SECONDS:
-            return
-        facts = {
-            "identity": self.identity,
-            "trainer": trainer.facts(),
-            "trace": [[t.iteration, t.seconds, dict(t.values)] for t in trace],
-        }
-        _write(self.folder, "checkpoint", trainer.tensors(), facts)
-        self.written = time.monotonic()
-
-    def remove(self) -> None:
-        """Remove the state: the run is done."""
-        for path in self.folder.glob("checkpoint*"):
-            path.unlink()

@@ -12,12 +12,13 @@ import numpy as np
 import torch
 from scipy import sparse
 from scipy.sparse import csgraph
-from scipy.spatial import ConvexHull, QhullError, cKDTree
+from scipy.spatial import cKDTree
 from torch import Tensor
 
 from parapoint import losses
 from parapoint.networks import ACTIVATIONS, Cycle, Networks, SurfaceNetworks
 from parapoint.presets import Preset
+from parapoint.sampling import hull_sample
 from parapoint.surface import FloatArray
 
 SNAPSHOTS = 100
@@ -442,25 +443,3 @@ def tangent_frames(points: FloatArray) -> FloatArray:
     first = np.cross(normals, least)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     return np.stack([first, np.cross(normals, first)])
-
-
-def hull_sample(points: FloatArray, count: int, seed: int) -> FloatArray:
-    """(count, 3) points spread evenly by area over the convex hull of (N, 3) points.
-
-    Points in a plane are their own hull's sample: they come back as they are.
-    """
-    try:
-        hull = ConvexHull(points)
-    except QhullError:
-        return points
-    return surface_sample(points, hull.simplices, count, seed)
-
-
-def surface_sample(vertices: FloatArray, faces: Any, count: int, seed: int) -> FloatArray:
-    """(count, 3) points spread evenly by area over the triangles (F, 3) of vertices (V, 3)."""
-    rng = np.random.default_rng(seed)
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    rows = rng.choice(len(faces), size=count, p=area / area.sum())
-    s, t = np.sqrt(rng.random((count, 1))), rng.random((count, 1))
-    return np.asarray((1 - s) * a[rows] + s * (1 - t) * b[rows] + s * t * c[rows])

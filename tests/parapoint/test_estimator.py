@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 import torch
 
-from parapoint import InputError, Mesh, ParaPoint, PointCloud, estimator, presets
-from parapoint.estimator import training_points
+from parapoint import InputError, ParaPoint, PointCloud, estimator, presets
 from parapoint.flattening import FlatMap, flat_map
 from parapoint.networks import Networks
 from parapoint.presets import PRESETS
 from parapoint.reconstruction import ReconstructionError
-from parapoint.testing import check_method, irregular_disk
+from parapoint.testing import check_method
 from parapoint.trainer import Trainer
 
 TINY = {"preset": "paper", "points": 150, "subset": 100, "iterations": 6, "device": "cpu"}
@@ -107,21 +106,6 @@ def test_rows_that_are_not_finite_are_dropped_and_counted(caplog) -> None:
     assert "dropped 1 of 401 points" in caplog.text
     assert (model.report_["dropped_not_finite"], model.report_["dropped_duplicates"]) == (1, 0)
     assert np.array_equal(model.points_, ParaPoint(**TINY).fit(points).points_)
-
-
-def test_training_points_come_from_the_vertices_or_from_the_faces_where_these_are_few() -> None:
-    disk = irregular_disk()
-    points = training_points(disk, 150, 0)
-    assert len(points) == 150
-    rng = np.random.default_rng(1)
-    many = rng.uniform(size=(3000, 3))
-    mesh = Mesh(many, np.arange(2700).reshape(-1, 3))  # 300 vertices are in no face
-    drawn = training_points(mesh, 500, 0)
-    used = {tuple(row) for row in many[:2700]}
-    assert len({tuple(row) for row in drawn}) == 500
-    assert all(tuple(row) in used for row in drawn)
-    assert len(training_points(mesh, 10_000, 0)) == 2700
-    assert not np.array_equal(training_points(mesh, 500, 1), drawn)
 
 
 def test_a_similar_cloud_gets_a_similar_map() -> None:
@@ -403,7 +387,7 @@ class KilledError(Exception):
 
 
 def test_a_killed_fit_goes_on_where_it_was(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr("parapoint.estimator.CHECKPOINT_SECONDS", 0.0)
+    monkeypatch.setattr("parapoint.saving.CHECKPOINT_SECONDS", 0.0)
     points = paraboloid()
     whole = ParaPoint(**TINY).fit(points)
     seen = []
