@@ -23,9 +23,6 @@ from scipy.sparse.linalg import splu
 
 from parapoint.surface import FloatArray, IntArray, Mesh, edge_table
 
-ISOMETRIC = (igl.SYMMETRIC_DIRICHLET, igl.LOG_ARAP)
-"""The isometric energies in turn. Near an isometry libigl's first gives no numbers; the second goes
-on."""
 LEAST_GAIN = 0.02
 """A descent ends when a step lowers what is left of the energy by less than this share."""
 CLOSE, EXACT = 5e-4, 1e-14
@@ -33,6 +30,9 @@ CLOSE, EXACT = 5e-4, 1e-14
 and of the map."""
 MOST_STEPS = 50
 """Steps of a descent at most."""
+LARGE = 1e4
+"""The side of the map on which libigl works: its line search takes a change of area of less than
+1e-10 for none, and would turn over the small faces of a map of side 1."""
 FLATTEST = 1e-22
 """Least area of a face, of the surface or the disk of radius 1: below it rounding decides."""
 
@@ -63,8 +63,7 @@ def bijective_map(mesh: Mesh, layout: FloatArray | None, deadline: float = math.
     elif flat is not None and flat.face_areas.min() > FLATTEST:
         uv = _descended(flat, uv, igl.SYMMETRIC_DIRICHLET, CLOSE, deadline)
     else:
-        for energy in ISOMETRIC:
-            uv = _descended(mesh, uv, energy, EXACT, deadline)
+        uv = _descended(mesh, uv, igl.SYMMETRIC_DIRICHLET, EXACT, deadline)
     uv = _descended(mesh, uv, igl.CONFORMAL, EXACT, deadline)
     if uv is start and time.monotonic() < deadline:
         raise BijectionError("no step lowers its distortion")
@@ -172,9 +171,9 @@ def _descended(
     """(V, 2) the bijective map `uv` (V, 2) moved down an energy by steps that gain `least`."""
     state = triangle.SCAFData()
     triangle.scaf_precompute(
-        np.asfortranarray(mesh.vertices),
+        np.asfortranarray(LARGE * mesh.vertices),
         np.asfortranarray(mesh.faces.astype(np.int32)),
-        np.asfortranarray(uv),
+        np.asfortranarray(LARGE * uv),
         energy,
         np.zeros(0, dtype=np.int32),
         np.zeros((0, 2), order="F"),
@@ -185,7 +184,7 @@ def _descended(
     for _ in range(MOST_STEPS):
         if time.monotonic() > deadline:
             break
-        moved = np.array(triangle.scaf_solve(1, state)[:, :2])
+        moved = np.array(triangle.scaf_solve(1, state)[:, :2]) / LARGE
         if not (signed_areas(moved, mesh.faces) > 0).all():  # nor if not a number
             break
         uv, after = moved, _excess(mesh, moved, energy)

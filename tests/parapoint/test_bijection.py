@@ -49,6 +49,35 @@ def test_a_surface_that_would_cover_itself_does_not() -> None:
     assert found["angle_difference_mean"] < start["angle_difference_mean"] / 3
 
 
+def pin(radius: float) -> Mesh:
+    """A disk of radius 1 with a tube on a hole of its middle, as tall as wide, with a tip."""
+    rings, along, around = 20, 10, 16
+    radii = np.append(np.geomspace(1, radius, rings), np.full(along, radius))
+    height = np.append(np.zeros(rings), np.linspace(0, radius, along + 1)[1:])
+    turn = 2 * np.pi * np.arange(around) / around
+    x, y = (np.outer(radii, of(turn)).ravel() for of in (np.cos, np.sin))
+    tip = [[0.0, 0.0, 1.3 * radius]]
+    points = np.concatenate([np.column_stack([x, y, np.repeat(height, around)]), tip])
+    corner = np.arange(len(points) - 1 - around)
+    beside = np.where(corner % around == around - 1, corner + 1 - around, corner + 1)
+    last, top = np.arange(around) + len(corner), np.full(around, len(points) - 1)
+    faces = [
+        np.stack([corner, beside, beside + around], axis=1),
+        np.stack([corner, beside + around, corner + around], axis=1),
+        np.stack([last, np.roll(last, -1), top], axis=1),
+    ]
+    return Mesh(points, np.concatenate(faces))
+
+
+def test_small_parts_are_mapped_as_well_as_large_ones() -> None:
+    # libigl's line search turned over the faces of the smaller tube, and the descent ended there.
+    angles = [
+        score(mesh, bijective_map(mesh, None))["angle_difference_mean"]
+        for mesh in (pin(1e-3), pin(1e-5))
+    ]
+    assert angles[1] == pytest.approx(angles[0], rel=0.05)
+
+
 def test_a_hole_stays_open_and_a_flat_surface_as_it_is() -> None:
     mesh = ring()
     assert len(mesh.boundary_loops) == 2
