@@ -11,7 +11,7 @@ from scipy.sparse import csgraph
 
 from parapoint.bijection import factored
 from parapoint.scale import laplacian
-from parapoint.surface import FloatArray, IntArray, Mesh
+from parapoint.surface import FloatArray, IntArray, Mesh, twin_halfedges
 
 LARGEST_SCALE = 8.0
 """Largest absolute log scale: what is smaller or larger is as good as lost."""
@@ -66,9 +66,7 @@ def _flat_edges(mesh: Mesh) -> np.ndarray:
 
 def _frames(mesh: Mesh, edges: np.ndarray, scale: FloatArray) -> FloatArray:
     """(F,) the angle by which each triangle's plane is turned, by transport from the first one."""
-    order = np.argsort(mesh.edge_of_halfedge, kind="stable")
-    twin = np.diff(mesh.edge_of_halfedge[order]) == 0
-    one, other = order[:-1][twin], order[1:][twin]
+    one, other = twin_halfedges(mesh.edge_of_halfedge)
     start, end = mesh.halfedges[one].T
     flow = np.asarray(laplacian(mesh)[start, end]).reshape(-1) * (scale[end] - scale[start])
     heading = np.angle(edges).reshape(-1)

@@ -27,7 +27,7 @@ from scipy.spatial import QhullError, cKDTree
 
 from parapoint.delaunay import delaunay_complex, empty_radii, insideness
 from parapoint.sheets import sheet_normals, sheet_triangles
-from parapoint.surface import FloatArray, IntArray, Mesh, edge_table, unit_normals
+from parapoint.surface import FloatArray, IntArray, Mesh, edge_table, twin_halfedges, unit_normals
 
 Vector = tuple[float, float, float]
 
@@ -255,9 +255,7 @@ def _single_fans(faces: IntArray) -> IntArray:
         _, edge_of_halfedge, _ = edge_table(faces)
         corner = np.arange(faces.size)
         following = np.roll(corner.reshape(-1, 3), -1, axis=1).reshape(-1)
-        order = np.argsort(edge_of_halfedge, kind="stable")
-        twin = edge_of_halfedge[order][1:] == edge_of_halfedge[order][:-1]
-        a, b = order[:-1][twin], order[1:][twin]
+        a, b = twin_halfedges(edge_of_halfedge)
         # Twins run in opposite directions: the start of one is the end of the other.
         links = np.concatenate([a, following[a]]), np.concatenate([following[b], b])
         graph = sparse.coo_matrix((np.ones(len(links[0]), dtype=bool), links), (faces.size,) * 2)
@@ -319,7 +317,5 @@ def _boundary_edges(mesh: Mesh) -> int:
 def _bends(mesh: Mesh) -> FloatArray:
     """The angles by which the surface turns at its inner edges, in radians."""
     normals = unit_normals(mesh.vertices, mesh.faces)
-    order = np.argsort(mesh.edge_of_halfedge, kind="stable")
-    twin = np.diff(mesh.edge_of_halfedge[order]) == 0
-    one, two = order[:-1][twin] // 3, order[1:][twin] // 3
-    return np.asarray(np.arccos(np.clip((normals[one] * normals[two]).sum(axis=1), -1, 1)))
+    one, other = (halfedge // 3 for halfedge in twin_halfedges(mesh.edge_of_halfedge))
+    return np.asarray(np.arccos(np.clip((normals[one] * normals[other]).sum(axis=1), -1, 1)))

@@ -60,6 +60,16 @@ def edge_table(triangles: IntArray) -> tuple[IntArray, IntArray, IntArray]:
     return edges, edge_of_halfedge.reshape(-1).astype(np.int64), count.astype(np.int64)
 
 
+def twin_halfedges(edge_of_halfedge: IntArray) -> tuple[IntArray, IntArray]:
+    """(P,) and (P,) rows of halfedges (3F,) of one edge, by edge; P the inner edges of a manifold.
+
+    Of an edge with more than two, each after the first is the twin of the one before.
+    """
+    order = np.argsort(edge_of_halfedge, kind="stable")
+    is_twin = np.diff(edge_of_halfedge[order]) == 0
+    return order[:-1][is_twin], order[1:][is_twin]
+
+
 def flat_faces(vertices: FloatArray, faces: IntArray) -> BoolArray:
     """(F,) which triangles have no area beyond rounding: no cotangent, gradient or normal."""
     double_area, relative = igl.doublearea(vertices, faces), 8 * np.finfo(np.float64).eps

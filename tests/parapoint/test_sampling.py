@@ -1,26 +1,66 @@
 import math
 
+import igl
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from parapoint import Mesh
-from parapoint.sampling import hull_sample, surface_sample, training_points
+from parapoint.sampling import even_sample, hull_sample, surface_sample, training_points
 from parapoint.testing import irregular_disk
 
 
-def test_training_points_come_from_the_vertices_or_from_the_faces_where_these_are_few() -> None:
-    disk = irregular_disk()
-    points = training_points(disk, 150, 0)
-    assert len(points) == 150
-    rng = np.random.default_rng(1)
-    many = rng.uniform(size=(3000, 3))
-    mesh = Mesh(many, np.arange(2700).reshape(-1, 3))  # 300 vertices are in no face
-    drawn = training_points(mesh, 500, 0)
-    used = {tuple(row) for row in many[:2700]}
-    assert len({tuple(row) for row in drawn}) == 500
-    assert all(tuple(row) in used for row in drawn)
-    assert len(training_points(mesh, 10_000, 0)) == 2700
-    assert not np.array_equal(training_points(mesh, 500, 1), drawn)
+def waves(steepness: float) -> Mesh:
+    """A square of 50 x 50 vertices with rows that go up and down."""
+    x, y = (of.ravel() for of in np.meshgrid(np.arange(50.0), np.arange(50.0)))
+    corner = (np.arange(49)[:, None] * 50 + np.arange(49)).ravel()
+    sides = [0, 1, 51], [0, 51, 50]
+    faces = np.concatenate([corner[:, None] + np.array(side) for side in sides])
+    return Mesh(np.column_stack([x, y, steepness * (x % 2)]), faces)
+
+
+def rows(points: np.ndarray) -> set[tuple[float, ...]]:
+    return {tuple(row) for row in points.tolist()}
+
+
+def test_training_points_of_a_mesh_come_from_the_vertices_of_its_faces() -> None:
+    many = np.random.default_rng(1).uniform(size=(3000, 3))
+    soup = Mesh(many, np.arange(2700).reshape(-1, 3))  # 300 vertices are in no face
+    drawn = training_points(soup, 500, 0)
+    assert len(rows(drawn)) == 500
+    assert rows(drawn) <= rows(many[:2700])
+    assert len(training_points(soup, 10_000, 0)) == 2700
+    assert not np.array_equal(training_points(soup, 500, 1), drawn)
+
+
+def test_points_of_faces_are_added_where_the_vertices_do_not_show_the_shape() -> None:
+    disk = irregular_disk()  # 81 vertices
+    assert rows(disk.vertices) < rows(training_points(disk, 150, 0))
+    assert len(training_points(disk, 150, 0)) == 150
+    assert len(training_points(waves(0.1), 4000, 0)) == 2500  # bends of 3.8 degrees in the mean
+    assert len(training_points(waves(0.5), 4000, 0)) == 4000  # of 17.7
+    turned = waves(0.1)
+    turned = Mesh(
+        turned.vertices, np.where(np.arange(4802)[:, None] % 2, turned.faces[:, ::-1], turned.faces)
+    )
+    assert len(training_points(turned, 4000, 0)) == 2500
+
+
+def test_points_on_faces_are_spread_evenly() -> None:
+    mesh = waves(1.0)
+    count = 6000
+    points = even_sample(mesh, count, 0)
+    assert len(points) == count
+    assert np.array_equal(points, even_sample(mesh, count, 0))
+    assert rows(points[:2500]) == rows(mesh.vertices)
+    squared, _, _ = igl.point_mesh_squared_distance(points, mesh.vertices, mesh.faces)
+    assert squared.max() < 1e-18
+    spacing = np.sqrt(mesh.face_areas.sum() / count)
+    nearest = cKDTree(points).query(points[2500:], 2)[0][:, 1]
+    assert nearest.min() > 0.6 * spacing
+    # No place is far from a point; of points drawn by area alone some would be.
+    dense = surface_sample(mesh.vertices, mesh.faces, 20_000, 1)
+    assert cKDTree(points).query(dense)[0].max() < 1.6 * spacing
 
 
 def test_hull_points_lie_on_the_hull_and_are_spread_by_area() -> None:
