@@ -33,6 +33,10 @@ MOST_STEPS = 50
 LARGE = 1e4
 """The side of the map on which libigl works: its line search takes a change of area of less than
 1e-10 for none, and would turn over the small faces of a map of side 1."""
+AT_LAYOUT = 0.1
+"""Excess of energy at which a map has come to the layout, so that it needs no other way there."""
+MOST_ROUNDS = 10
+"""Ways to the layout that are tried at most; one to five are taken."""
 FLATTEST = 1e-22
 """Least area of a face, of the surface or the disk of radius 1: below it rounding decides."""
 
@@ -61,7 +65,7 @@ def bijective_map(mesh: Mesh, layout: FloatArray | None, deadline: float = math.
     if flat is not None and is_bijective(flat, flat.vertices[:, :2]):
         uv = flat.vertices[:, :2]
     elif flat is not None and flat.face_areas.min() > FLATTEST:
-        uv = _descended(flat, uv, igl.SYMMETRIC_DIRICHLET, CLOSE, deadline)
+        uv = _led(mesh, flat, uv, deadline)
     else:
         uv = _descended(mesh, uv, igl.SYMMETRIC_DIRICHLET, EXACT, deadline)
     uv = _descended(mesh, uv, igl.CONFORMAL, EXACT, deadline)
@@ -159,6 +163,22 @@ def signed_areas(uv: FloatArray, faces: IntArray) -> FloatArray:
     """(F,) signed areas of triangles in the plane."""
     a, b = uv[faces[:, 1]] - uv[faces[:, 0]], uv[faces[:, 2]] - uv[faces[:, 0]]
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
+
+
+def _led(mesh: Mesh, flat: Mesh, uv: FloatArray, deadline: float) -> FloatArray:
+    """(V, 2) the bijective map `uv` (V, 2) of a mesh led towards the layout `flat`.
+
+    Where it is held up on the way, among triangles that Tutte's embedding squeezes, the conformal
+    energy opens these, and it sets out again.
+    """
+    left = math.inf
+    for _ in range(MOST_ROUNDS):
+        uv = _descended(flat, uv, igl.SYMMETRIC_DIRICHLET, CLOSE, deadline)
+        before, left = left, _excess(flat, uv, igl.SYMMETRIC_DIRICHLET)
+        if left < AT_LAYOUT or not left < (1 - LEAST_GAIN) * before:
+            break
+        uv = _descended(mesh, uv, igl.CONFORMAL, EXACT, deadline)
+    return uv
 
 
 def _descended(

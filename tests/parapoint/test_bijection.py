@@ -5,7 +5,9 @@ import pytest
 from benchmarks.metrics import evaluate
 from parapoint import bijection
 from parapoint.bijection import BijectionError, bijective_map, is_bijective, signed_areas, tutte
+from parapoint.layout import scaled_layout
 from parapoint.parameterization import Parameterization
+from parapoint.scale import even_scale
 from parapoint.surface import Mesh
 
 
@@ -76,6 +78,24 @@ def test_small_parts_are_mapped_as_well_as_large_ones() -> None:
         for mesh in (pin(1e-3), pin(1e-5))
     ]
     assert angles[1] == pytest.approx(angles[0], rel=0.05)
+
+
+def test_a_map_that_is_held_up_sets_out_again(monkeypatch) -> None:
+    mesh = ramp()
+    layout = scaled_layout(mesh, even_scale(mesh))
+    free = score(mesh, bijective_map(mesh, layout))
+    descended, energies = bijection._descended, []
+
+    def held_up_once(of, uv, energy, *rest):
+        energies.append(energy)
+        return uv if len(energies) == 1 else descended(of, uv, energy, *rest)
+
+    monkeypatch.setattr(bijection, "_descended", held_up_once)
+    held_up = score(mesh, bijective_map(mesh, layout))
+    isometric, conformal = igl.SYMMETRIC_DIRICHLET, igl.CONFORMAL
+    assert energies == [isometric, conformal, isometric, conformal]
+    for name in ("angle_difference_mean", "area_discrepancy_total"):
+        assert held_up[name] == pytest.approx(free[name], abs=0.01)
 
 
 def test_a_hole_stays_open_and_a_flat_surface_as_it_is() -> None:
