@@ -6,7 +6,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import ClassVar
 
-import igl
 import numpy as np
 from scipy.sparse import csgraph
 
@@ -21,7 +20,7 @@ from baselines.flattening import (
     singular_values,
 )
 from baselines.packing import by_component
-from baselines.slim import DENSITIES
+from baselines.slim import DENSITIES, stepper
 from baselines.tutte import tutte
 from parapoint import presets
 from parapoint.bijection import BijectionError, isometric_map
@@ -250,7 +249,8 @@ class _Run:
     def _set(self, mesh: Mesh) -> None:
         self.mesh = mesh
         self.unit = float(np.sqrt(mesh.face_areas.sum()))
-        self.frame = frames(domain(mesh))
+        self.domain = domain(mesh)
+        self.frame = frames(self.domain)
 
     def begin(self, uv: FloatArray | None) -> None:
         """Start from an isometric map or, if it is one to one and has less energy, from `uv`.
@@ -275,7 +275,7 @@ class _Run:
             uv = isometric_map(self.mesh)
             if len(crossing_vertices(self.mesh, uv)) == 0:
                 return "isometric", uv
-        uv = tutte(domain(self.mesh))
+        uv = tutte(self.domain)
         folded = int((signed_areas(uv, self.mesh.faces) <= 0).sum())
         if folded:
             raise FlatteningError(
@@ -315,16 +315,7 @@ class _Run:
 
     def _stepped(self, held: IntArray, steps: int) -> FloatArray:
         """(V, 2) the map after some steps of libigl's SLIM with some vertices held in place."""
-        solver = igl.slim_precompute(
-            np.asfortranarray(self.mesh.vertices),
-            np.asfortranarray(self.mesh.faces.astype(np.int32)),
-            np.asfortranarray(self.uv),
-            igl.MappingEnergyType.SYMMETRIC_DIRICHLET,
-            held.astype(np.int32),
-            np.asfortranarray(self.uv[held]),
-            HOLD,
-        )
-        return np.ascontiguousarray(igl.slim_solve(solver, steps))
+        return stepper(self.domain, self.uv, "symmetric_dirichlet", held, HOLD)(steps)
 
     def lengthen(self, price: float) -> None:
         """Lead the seam to where the map is most distorted, while that pays."""

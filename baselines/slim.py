@@ -22,9 +22,10 @@ from baselines.flattening import (
     singular_values,
 )
 from baselines.tutte import tutte
+from parapoint.bijection import LARGE
 from parapoint.errors import InputError
 from parapoint.parameterization import Parameterization, TracePoint
-from parapoint.surface import FloatArray, Surface
+from parapoint.surface import FloatArray, IntArray, Surface
 
 Density = Callable[[FloatArray, FloatArray], FloatArray]
 
@@ -107,19 +108,11 @@ class SLIM:
         def energy(uv: FloatArray) -> float:
             return map_energy(self.energy, weight, *singular_values(frame, uv, disk.faces))
 
-        solver = igl.slim_precompute(
-            np.asfortranarray(disk.vertices),
-            np.asfortranarray(disk.faces.astype(np.int32)),
-            np.asfortranarray(start),
-            igl.MappingEnergyType.__members__[self.energy.upper()],
-            np.zeros(0, dtype=np.int32),  # no vertex is held
-            np.zeros((0, 2), order="F"),
-            0.0,
-        )
+        stepped = stepper(disk, start, self.energy)
         uv = start
         trace = [TracePoint(0, perf_counter() - began, {self.energy: energy(start)}, start)]
         for step in range(1, self.iterations + 1):
-            uv = np.ascontiguousarray(igl.slim_solve(solver, 1))
+            uv = stepped(1)
             kept = uv if is_kept(step, self.iterations) else None
             seconds = perf_counter() - began
             trace.append(TracePoint(step, seconds, {self.energy: energy(uv)}, kept))
@@ -139,6 +132,38 @@ class SLIM:
             "iterations": self.iterations,
         }
         return Parameterization(uv, disk.faces, tuple(trace), report)
+
+
+def stepper(
+    disk: Domain,
+    uv: FloatArray,
+    energy: str,
+    held: IntArray | None = None,
+    weight: float = 0.0,
+) -> Callable[[int], FloatArray]:
+    """A function that takes so many more of libigl's steps and gives the map (V, 2).
+
+    The unit of the surface makes no difference: see `parapoint.bijection.LARGE`.
+
+    Args:
+        disk: the surface.
+        uv: (V, 2) where it starts, without flips.
+        energy: key of DENSITIES.
+        held: (n,) vertices that are drawn to where they start.
+        weight: of that pull.
+    """
+    fixed = np.zeros(0, dtype=np.int64) if held is None else held
+    scale = LARGE / disk.area**0.5
+    state = igl.slim_precompute(
+        np.asfortranarray(scale * disk.vertices),
+        np.asfortranarray(disk.faces.astype(np.int32)),
+        np.asfortranarray(scale * uv),
+        igl.MappingEnergyType.__members__[energy.upper()],
+        fixed.astype(np.int32),
+        np.asfortranarray(scale * uv[fixed]),
+        weight,
+    )
+    return lambda steps: np.ascontiguousarray(igl.slim_solve(state, steps) / scale)
 
 
 def map_energy(name: str, weight: FloatArray, s1: FloatArray, s2: FloatArray) -> float:

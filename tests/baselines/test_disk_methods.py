@@ -118,18 +118,34 @@ def test_cone_is_unrolled_by_bff_to_its_sector():
         assert_allclose(stretches(mesh, mapped(spec, mesh)), 1, atol=1e-9)
 
 
+@pytest.mark.parametrize("unit", [1e3, 1e-6])
 @pytest.mark.parametrize("spec", [*DISK_METHODS, "meshlab_lscm", "meshlab_harmonic"])
-def test_moving_turning_and_scaling_the_surface_only_scales_its_stretches(spec):
+def test_moving_turning_and_scaling_the_surface_only_scales_its_stretches(spec, unit):
     pytest.importorskip("pymeshlab") if "meshlab" in spec else None
-    mesh = irregular_disk()
+    mesh = irregular_disk()  # sheared, so that no two corners are equally far
+    mesh = Mesh(mesh.vertices @ [[1, 0, 0], [0.3, 1.2, 0], [0, 0, 1]], mesh.faces)
     turn, _ = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))
     turn *= np.sign(np.linalg.det(turn))
-    moved = Mesh(1000 * mesh.vertices @ turn.T + [5.0, 6.0, 7.0], mesh.faces)
+    moved = Mesh(unit * (mesh.vertices @ turn.T + [0.5, 0.6, 0.7]), mesh.faces)
     # SLIM's line search decides by floating-point comparisons; MeshLab rounds to float32.
     limit = 1e-2 if "meshlab" in spec else 1e-5
     assert_allclose(
         stretches(moved, mapped(spec, moved)), stretches(mesh, mapped(spec, mesh)), atol=limit
     )
+
+
+def test_slim_takes_surfaces_of_any_unit():
+    # libigl's own line search does not move this spiral ramp by a step where it is so small.
+    turn, radius = (of.ravel() for of in np.meshgrid(np.linspace(0, 9, 60), np.linspace(1, 2, 8)))
+    ramp = np.stack([radius * np.cos(turn), radius * np.sin(turn), 0.02 * turn], axis=1)
+    corner = (np.arange(7)[:, None] * 60 + np.arange(59)).ravel()
+    faces = np.concatenate([corner[:, None] + side for side in ([0, 61, 1], [0, 60, 61])])
+    energies = [
+        SLIM().parameterize(Mesh(unit * ramp, faces), seed=0).report["end_energy"]
+        for unit in (1.0, 1e-6)
+    ]
+    assert energies[0] < 4.2
+    assert energies[1] == pytest.approx(energies[0], rel=1e-3)
 
 
 @pytest.mark.parametrize("spec", DISK_METHODS)
