@@ -165,9 +165,9 @@ class ParaPoint:
         """Learn the map of a surface.
 
         Args:
-            points: (N, 3) coordinates, a PointCloud, or a Mesh (its vertices, or points on its
-                faces where they are few). Rows that are not finite are left out, repeated ones
-                count once; `report_` has the numbers. Units are free.
+            points: (N, 3) coordinates, a PointCloud, or a Mesh (its vertices, and points on its
+                faces where those do not show its shape). Rows that are not finite are left out,
+                repeated ones count once; `report_` has the numbers. Units are free.
             y: not used.
             checkpoint: folder where the state is saved each minute. A fit that finds the state of
                 the same run there goes on from it; at the end the state is removed. Not used where

@@ -135,10 +135,10 @@ the paper in this:
   developed, has no handle in place of 24, and 0.10 % of its faces flipped in place of 26 %; lucy,
   on which nothing was chosen, one in place of 48, and 2.0 % in place of 21 %; nefertiti has 0.02 to
   0.05 % in place of 0.19 to 0.42 % on three seeds.
-- A coarse mesh gives points of its faces, too (`parapoint.sampling`): the vertices alone do not show
-  legs and fingers of a few of them around. Of lucy 0.3 % of the faces are flipped in place of
-  2.0 %, of seamster's cow 0.5 in place of 2.0 %, of camel_b 1 in place of 16 %. On seven models that
-  their vertices show, more points changed no figure by more than what seeds differ by.
+- A coarse mesh gives points of its faces, too (`parapoint.sampling`): its vertices alone do not
+  show legs and fingers of a few of them around. Of lucy 0.3 % of the faces are flipped in place of
+  2.0 %, of seamster's cow 0.5 in place of 2.0 %, of camel_b 1 in place of 16 %. On seven models
+  that their vertices show, more points changed no figure by more than what seeds differ by.
 - Triangles along the points' own sheets (`parapoint.sheets`) are taken where sheets cross, as no
   complex of tetrahedra holds two that do. Of keenan-ogre, whose eyeball runs through its socket and
   on which this was developed, 0.37 % of the faces are flipped in place of 0.73 %, and 0.6 % of the
