@@ -19,6 +19,7 @@ from scipy import sparse
 
 from baselines import registry
 from benchmarks.metric_speed import speed_map
+from parapoint.bijection import LARGE
 from parapoint.method import Method, MissingError
 from parapoint.parameterization import Parameterization
 from parapoint.preparation import prepared
@@ -95,13 +96,15 @@ def bare_arap(mesh: Mesh, _: Parameterization) -> Call:
 
 
 def bare_slim(mesh: Mesh, made: Parameterization) -> Call:
-    """Twenty steps of SLIM from the start of the method."""
+    """Twenty steps of SLIM from the start of the method, on a map of the same side."""
+    scale = LARGE / (float(igl.doublearea(mesh.vertices, mesh.faces).sum()) / 2) ** 0.5
+    vertices, start = scale * mesh.vertices, scale * np.asarray(made.trace[0].uv)
 
     def call() -> None:
         solver = igl.slim_precompute(
-            np.asfortranarray(mesh.vertices),
+            np.asfortranarray(vertices),
             np.asfortranarray(mesh.faces.astype(np.int32)),
-            np.asfortranarray(made.trace[0].uv),
+            np.asfortranarray(start),
             igl.MappingEnergyType.SYMMETRIC_DIRICHLET,
             np.zeros(0, dtype=np.int32),
             np.zeros((0, 2), order="F"),
