@@ -92,15 +92,17 @@ def even_sample(mesh: Mesh, count: int, seed: int) -> FloatArray:
     """
     vertices = np.unique(mesh.vertices[mesh.referenced], axis=0)
     candidates = surface_sample(mesh.vertices, mesh.faces, CANDIDATES * count, seed)
-    points = np.concatenate([vertices, candidates])
     radius = PACKED * np.sqrt(mesh.face_areas.sum() / count)
-    earlier, later = cKDTree(points).query_pairs(radius, output_type="ndarray").T
+    # Vertices first, and apart: of a small part with many of them all pairs would be too many.
+    candidates = candidates[cKDTree(vertices).query(candidates)[0] > radius]
+    earlier, later = cKDTree(candidates).query_pairs(radius, output_type="ndarray").T
     order = np.argsort(later, kind="stable")
-    stays = [True] * len(points)
+    stays = [True] * len(candidates)
     for i, j in zip(earlier[order].tolist(), later[order].tolist(), strict=True):
-        if stays[i] and j >= len(vertices):
+        if stays[i]:
             stays[j] = False
-    return np.asarray(points[stays][: max(count, len(vertices))])
+    added = candidates[stays][: max(0, count - len(vertices))]
+    return np.concatenate([vertices, added])
 
 
 def hull_sample(points: FloatArray, count: int, seed: int) -> FloatArray:

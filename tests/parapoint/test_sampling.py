@@ -63,6 +63,26 @@ def test_points_on_faces_are_spread_evenly() -> None:
     assert cKDTree(points).query(dense)[0].max() < 1.6 * spacing
 
 
+def test_a_small_part_with_many_vertices_takes_no_more_pairs_than_a_large_one(monkeypatch) -> None:
+    figure, size = waves(1.0), 2500
+    ground = 1e6 * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    scene = Mesh(
+        np.concatenate([figure.vertices, ground]),
+        np.concatenate([figure.faces, [[size, size + 1, size + 2]]]),
+    )
+    pairs = []
+
+    class Counting(cKDTree):
+        def query_pairs(self, *arguments, **options):
+            found = super().query_pairs(*arguments, **options)
+            pairs.append(len(found))
+            return found
+
+    monkeypatch.setattr("parapoint.sampling.cKDTree", Counting)
+    assert len(training_points(scene, 6000, 0)) == 6000
+    assert sum(pairs) < 50 * 6000
+
+
 def test_hull_points_lie_on_the_hull_and_are_spread_by_area() -> None:
     rng = np.random.default_rng(0)
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 4)], float)
