@@ -1,11 +1,12 @@
 """`python -m benchmarks speed`: how much of the machine's rate the heavy parts reach.
 
 FLOPs are counted from the sizes of the layers, and rates are over processor time, all threads
-together, best of several runs: on a busy machine it does not count the time in which others ran.
-Each row stands against a large matrix product and against the bare products of its own layers,
-forward and backward, all three measured in turn, as a processor's rate drifts. The second is what a
-step can reach at all: cache misses at these sizes take a fifth of the large product's rate before
-anything else is done.
+together. A shared processor's rate changes by a factor of two within seconds, for that time also:
+it serves another program on the same core. So each run stands between two large matrix products,
+and its fraction is the median, over rounds, of its rate to theirs. The bare products of its own
+layers, forward and backward, are measured in the same way; they are what a step can reach at all:
+cache misses at these sizes take a fifth to a third of the large product's rate before anything else
+is done.
 """
 
 from __future__ import annotations
@@ -20,12 +21,28 @@ from typing import NamedTuple
 import numpy as np
 from rich.table import Table
 
+from parapoint.surface import FloatArray
+
 PRODUCT = 2048
 """Rows and columns of the float32 matrices whose product is the machine's rate."""
 MAPPED = 250_000
 """Dense points of the paper's texture mapping."""
 STEPS = (256, 512, 2048)
 """Points of a training step."""
+FEWEST_ROUNDS, ENOUGH = 7, 10.0
+"""Rounds in which a row is measured at least, and seconds after which there are no more."""
+
+
+class Work(NamedTuple):
+    """What is measured.
+
+    Attributes:
+        run: does it once.
+        operations: FLOPs that it takes.
+    """
+
+    run: Callable[[], object]
+    operations: float
 
 
 class Rate(NamedTuple):
@@ -33,11 +50,11 @@ class Rate(NamedTuple):
 
     Attributes:
         what: what ran.
-        seconds: wall time of one run, the best of several.
-        cpu_seconds: processor time of one run, the best of several.
-        gflops: 1e9 operations a second of processor time, multiplications and additions counted
-            apart.
-        fraction: of the matrix product's rate.
+        seconds: wall time of one run, the median.
+        cpu_seconds: processor time of one run, the median.
+        gflops: 1e9 operations a second of processor time, the median; multiplications and
+            additions counted apart.
+        fraction: of the rate of the matrix products before and after.
         bare_fraction: of the rate of the bare products of its layers; NaN for the product itself.
     """
 
@@ -59,17 +76,10 @@ def training_rates() -> list[Rate]:
     from parapoint.trainer import Trainer
 
     left = torch.rand(PRODUCT, PRODUCT)
-    product, of_product = partial(torch.mm, left, left), 2 * PRODUCT**3
-    ((seconds, cpu),) = _best([product], 5)
+    product = Work(partial(torch.mm, left, left), 2 * PRODUCT**3)
     what = f"matrix product, {PRODUCT} x {PRODUCT}"
-    rows = [Rate(what, seconds, cpu, of_product / cpu / 1e9, 1.0, np.nan)]
-
-    def add(what: str, run: Callable[[], object], operations: float, layers: Products) -> None:
-        own, large, bare = _best([run, product, layers.run], 5)
-        rate = operations / own[1]
-        peak, reachable = of_product / large[1], layers.operations / bare[1]
-        rows.append(Rate(what, *own, rate / 1e9, rate / peak, rate / reachable))
-
+    wall, cpu = np.median(_in_turn([product])[:, 0], axis=0)
+    rows = [Rate(what, wall, cpu, product.operations / cpu / 1e9, 1.0, np.nan)]
     points = np.random.default_rng(0).normal(size=(max(STEPS), 3))
     points /= np.linalg.norm(points, axis=1, keepdims=True)
     for preset in ("paper", "smooth"):
@@ -82,14 +92,15 @@ def training_rates() -> list[Rate]:
             lattice = round(count**0.5) ** 2
             operations = 3 * 2 * (there * count + back * lattice)  # the backward pass is two more
             layers = _products(numbers.hidden, 3 * (count + lattice), backward=True)  # as in Wrap
-            add(f"step of {preset}, {count} points", partial(next, steps), operations, layers)
+            step = Work(partial(next, steps), operations)
+            rows.append(_rate(f"step of {preset}, {count} points", step, layers, product))
         model = ParaPoint(preset=preset, iterations=1, points=256, device="cpu").fit(points)
         assert isinstance(model.networks_, SubNetworks)
         dense = np.resize(points, (MAPPED, 3))
         operations = 2 * MAPPED * (cost(model.networks_.cut) + cost(model.networks_.unwrap))
         layers = _products(numbers.hidden, BATCH["cpu"], backward=False)
-        mapping = partial(model.transform, dense)
-        add(f"mapping of {MAPPED:,} points, {preset}", mapping, operations, layers)
+        mapping = Work(partial(model.transform, dense), operations)
+        rows.append(_rate(f"mapping of {MAPPED:,} points, {preset}", mapping, layers, product))
     return rows
 
 
@@ -104,19 +115,7 @@ def training_table() -> Table:
     return table
 
 
-class Products(NamedTuple):
-    """The bare products of a stack.
-
-    Attributes:
-        run: takes them.
-        operations: FLOPs that it takes.
-    """
-
-    run: Callable[[], None]
-    operations: float
-
-
-def _products(hidden: tuple[int, ...], rows: int, *, backward: bool) -> Products:
+def _products(hidden: tuple[int, ...], rows: int, *, backward: bool) -> Work:
     """The products of a stack 3 → 3 at so many rows."""
     import torch
 
@@ -130,18 +129,31 @@ def _products(hidden: tuple[int, ...], rows: int, *, backward: bool) -> Products
                 weight.t() @ gradient.t()
                 x.t() @ gradient
 
-    return Products(run, 2 * rows * sum(i * o for i, o in sizes) * (3 if backward else 1))
+    return Work(run, 2 * rows * sum(i * o for i, o in sizes) * (3 if backward else 1))
 
 
-def _best(runs: list[Callable[[], object]], rounds: int) -> list[tuple[float, float]]:
-    """The shortest wall and processor times of each of `runs`, which are taken in turn.
+def _rate(what: str, work: Work, layers: Work, product: Work) -> Rate:
+    """The row of a work: it and the bare products of its layers against the product around them."""
+    times = _in_turn([product, work, product, layers, product])
+    before, own, between, bare, after = times[:, :, 1].T
+    peak = product.operations
+    fraction = float(np.median(work.operations / own * (before + between) / 2) / peak)
+    reachable = float(np.median(layers.operations / bare * (between + after) / 2) / peak)
+    wall, cpu = np.median(times[:, 1], axis=0)
+    return Rate(what, wall, cpu, work.operations / cpu / 1e9, fraction, fraction / reachable)
+
+
+def _in_turn(works: list[Work]) -> FloatArray:
+    """(rounds, works, 2) wall and processor seconds of each, one after another, round by round.
 
     After one round that is not counted.
     """
-    times = np.empty((rounds + 1, len(runs), 2))
-    for one_round in times:
-        for run, taken in zip(runs, one_round, strict=True):
-            begin = time.perf_counter(), time.process_time()
-            run()
-            taken[:] = time.perf_counter() - begin[0], time.process_time() - begin[1]
-    return [(float(wall), float(cpu)) for wall, cpu in times[1:].min(axis=0)]
+    rounds: list[list[tuple[float, float]]] = []
+    begun = time.perf_counter()
+    while len(rounds) <= FEWEST_ROUNDS or time.perf_counter() - begun < ENOUGH:
+        rounds.append([])
+        for work in works:
+            wall, cpu = time.perf_counter(), time.process_time()
+            work.run()
+            rounds[-1].append((time.perf_counter() - wall, time.process_time() - cpu))
+    return np.array(rounds[1:])
