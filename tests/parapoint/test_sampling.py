@@ -10,13 +10,13 @@ from parapoint.sampling import even_sample, hull_sample, surface_sample, trainin
 from parapoint.testing import irregular_disk
 
 
-def waves(steepness: float) -> Mesh:
+def waves() -> Mesh:
     """A square of 50 x 50 vertices with rows that go up and down."""
     x, y = (of.ravel() for of in np.meshgrid(np.arange(50.0), np.arange(50.0)))
     corner = (np.arange(49)[:, None] * 50 + np.arange(49)).ravel()
     sides = [0, 1, 51], [0, 51, 50]
     faces = np.concatenate([corner[:, None] + np.array(side) for side in sides])
-    return Mesh(np.column_stack([x, y, steepness * (x % 2)]), faces)
+    return Mesh(np.column_stack([x, y, x % 2]), faces)
 
 
 def rows(points: np.ndarray) -> set[tuple[float, ...]]:
@@ -29,25 +29,33 @@ def test_training_points_of_a_mesh_come_from_the_vertices_of_its_faces() -> None
     drawn = training_points(soup, 500, 0)
     assert len(rows(drawn)) == 500
     assert rows(drawn) <= rows(many[:2700])
-    assert len(training_points(soup, 10_000, 0)) == 2700
     assert not np.array_equal(training_points(soup, 500, 1), drawn)
 
 
 def test_points_of_faces_are_added_where_the_vertices_do_not_show_the_shape() -> None:
     disk = irregular_disk()  # 81 vertices
-    assert rows(disk.vertices) < rows(training_points(disk, 150, 0))
-    assert len(training_points(disk, 150, 0)) == 150
-    assert len(training_points(waves(0.1), 4000, 0)) == 2500  # bends of 3.8 degrees in the mean
-    assert len(training_points(waves(0.5), 4000, 0)) == 4000  # of 17.7
-    turned = waves(0.1)
-    turned = Mesh(
-        turned.vertices, np.where(np.arange(4802)[:, None] % 2, turned.faces[:, ::-1], turned.faces)
+    points = training_points(disk, 150, 0)
+    assert rows(disk.vertices) < rows(points)
+    assert len(points) == 150
+    sheet = waves()
+    assert len(training_points(sheet, 4000, 0)) == 2500
+    # As triangles with corners of their own it is the same surface.
+    apart = Mesh(
+        sheet.vertices[sheet.faces.reshape(-1)], np.arange(sheet.faces.size).reshape(-1, 3)
     )
-    assert len(training_points(turned, 4000, 0)) == 2500
+    assert len(training_points(apart, 4000, 0)) == 2500
+    # A second sheet is nearer to the first than its vertices are to one another.
+    for distance, count in ((5.0, 5000), (0.5, 20_000)):
+        above = sheet.vertices + np.array([0, 0, distance])
+        both = Mesh(
+            np.concatenate([sheet.vertices, above]),
+            np.concatenate([sheet.faces, sheet.faces + 2500]),
+        )
+        assert len(training_points(both, 20_000, 0)) == count
 
 
 def test_points_on_faces_are_spread_evenly() -> None:
-    mesh = waves(1.0)
+    mesh = waves()
     count = 6000
     points = even_sample(mesh, count, 0)
     assert len(points) == count
@@ -64,7 +72,7 @@ def test_points_on_faces_are_spread_evenly() -> None:
 
 
 def test_a_small_part_with_many_vertices_takes_no_more_pairs_than_a_large_one(monkeypatch) -> None:
-    figure, size = waves(1.0), 2500
+    figure, size = waves(), 2500
     ground = 1e6 * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     scene = Mesh(
         np.concatenate([figure.vertices, ground]),
@@ -79,7 +87,7 @@ def test_a_small_part_with_many_vertices_takes_no_more_pairs_than_a_large_one(mo
             return found
 
     monkeypatch.setattr("parapoint.sampling.cKDTree", Counting)
-    assert len(training_points(scene, 6000, 0)) == 6000
+    assert len(even_sample(scene, 6000, 0)) == 6000
     assert sum(pairs) < 50 * 6000
 
 
