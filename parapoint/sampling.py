@@ -81,11 +81,10 @@ def _is_coarse(mesh: Mesh) -> bool:
         return True
     i, j = edge_table(row.reshape(-1, 3))[0].T
     links = sparse.coo_matrix((np.ones(len(i), dtype=bool), (i, j)), (len(places),) * 2).tocsr()
-    links += links.T
-    two_edges_off = links + links @ links
-    near = cKDTree(places).query(places, NEAREST + 1)[1][:, 1:]
-    is_along = two_edges_off[np.repeat(np.arange(len(places)), NEAREST), near.reshape(-1)]
-    return bool(1 - is_along.mean() > FAR)
+    around = links + links.T + sparse.identity(len(places), dtype=bool, format="csr")
+    near = cKDTree(places).query(places, NEAREST + 1)[1][:, 1:].reshape(-1)
+    shared = around[np.repeat(np.arange(len(places)), NEAREST)].multiply(around[near])
+    return bool((shared.sum(axis=1) == 0).mean() > FAR)
 
 
 def even_sample(mesh: Mesh, count: int, seed: int) -> FloatArray:
