@@ -2,8 +2,9 @@
 
 The cloud is triangulated, cut, and flattened by a bijective map. The cuts lead to where the scale
 of a conformal map, found by a linear solve, is most extreme (as in Sawhney and Crane 2017,
-"Boundary first flattening", section 6), and are as long as an even scale needs. The map is laid out
-by that scale (`parapoint.layout`), then made bijective (`parapoint.bijection`).
+"Boundary first flattening", section 6), and are as long as an even scale needs, and to what would
+be too small for numbers without. The map is laid out by that scale (`parapoint.layout`), then made
+bijective (`parapoint.bijection`).
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from parapoint.bijection import bijective_map, signed_areas
+from parapoint.bijection import FLATTEST, bijective_map, signed_areas, tutte
 from parapoint.cutting import cut_along, cut_to_disk
 from parapoint.denoising import denoised
 from parapoint.layout import scaled_layout
@@ -33,6 +34,8 @@ with noise of 0.5 and 1 % of the diagonal, 0.6 to 3 on models with details as fi
 spacing."""
 TIPS = 3
 """Extremal points that are tried as the tip of each cut."""
+MOST_OPENINGS = 50
+"""Cuts at most to what Tutte's embedding flattens; one to three were needed where any was."""
 LONELY = 6.0
 """Cost of a vertex most of whose edges cross the seam, in such edges' share."""
 SWEEPS = 10
@@ -119,7 +122,8 @@ def _seamed(mesh: Mesh) -> Mesh:
     if mesh.genus > 0 or not mesh.boundary_loops:
         opened = cut_to_disk(mesh)
     opened = _joined_loops(opened)
-    return _scale_cuts(opened, budget - (len(opened.vertices) - len(mesh.vertices)))
+    opened = _scale_cuts(opened, budget - (len(opened.vertices) - len(mesh.vertices)))
+    return _embeddable(opened)
 
 
 def _layout(disk: Mesh) -> FloatArray | None:
@@ -213,6 +217,31 @@ def _scale_cuts(mesh: Mesh, budget: int) -> Mesh:
         if gain <= 0:
             break
         mesh, scale, discrepancy, budget = cut, new_scale, new_discrepancy, budget - length
+    return mesh
+
+
+def _embeddable(mesh: Mesh) -> Mesh:
+    """The planar domain cut until Tutte's embedding has room for all of its faces.
+
+    It shrinks a horn or a tail exponentially from its foot to its tip, and so it does a strip of
+    triangles that hangs into a hole. A cut from the outer loop to the far end of what is too flat
+    for numbers, or to the hole, brings this to the rim of the disk.
+    """
+    for _ in range(MOST_OPENINGS):
+        flat = ~(signed_areas(tutte(mesh), mesh.faces) > FLATTEST)
+        if not flat.any():
+            break
+        outer, *holes = mesh.boundary_loops
+        distance, previous, _ = csgraph.dijkstra(
+            _graph(mesh), indices=outer, return_predecessors=True, min_only=True
+        )
+        squeezed = np.unique(mesh.faces[flat])
+        path = _path(previous, int(squeezed[distance[squeezed].argmax()]))
+        at_hole = np.flatnonzero(np.isin(path[:, 0], np.concatenate([outer[:0], *holes])))
+        path = path[at_hole[-1] :] if len(at_hole) else path
+        if not len(path):
+            break
+        mesh = cut_along(mesh, path)
     return mesh
 
 

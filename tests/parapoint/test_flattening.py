@@ -52,6 +52,23 @@ def test_a_closed_surface_is_cut_and_nearly_conformal(points: np.ndarray, genus:
     assert np.median(angles_kept(flat)) > 0.85
 
 
+def test_a_thin_pin_on_a_plate_is_mapped() -> None:
+    # Six points around and sixty rings: in Tutte's embedding its tip is too small for numbers.
+    x, y = (side.ravel() for side in np.meshgrid(*[np.linspace(-3, 3, 31)] * 2))
+    outside = np.hypot(x, y) > 0.3
+    ring, place = (rows.ravel() for rows in np.indices((60, 6)))
+    turn = (place + ring % 2 / 2) * np.pi / 3
+    plate = np.column_stack([x, y, 0 * x])[outside]
+    pin = np.column_stack([0.2 * np.cos(turn), 0.2 * np.sin(turn), 0.17 * ring])
+    points = np.concatenate([plate, pin, [[0, 0, 10.15]]])
+    flat = flat_map(points)
+    assert len(flat.anchors) == len(points)
+    assert flat.facts["genus"] == 0
+    assert flat.facts["boundary_loops"] == 1
+    assert 60 <= flat.facts["seam_edges"] <= 90  # along the pin and from its foot to the rim
+    assert np.median(angles_kept(flat)) > 0.9
+
+
 def test_the_inverse_derivatives_undo_the_derivatives() -> None:
     flat = flat_map(SPHERE)
     back = flat.jacobians @ flat.inverse_jacobians
