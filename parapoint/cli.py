@@ -19,7 +19,8 @@ from parapoint import console
 from parapoint.components import components
 from parapoint.errors import InputError
 from parapoint.files import read_surface, write_obj, write_points
-from parapoint.spanning import opened
+from parapoint.sampling import mean_spacing
+from parapoint.spanning import opened, spanning_edges
 from parapoint.surface import FloatArray, Mesh, PointCloud, Surface
 
 if TYPE_CHECKING:
@@ -194,10 +195,15 @@ def _write(
 ) -> dict[str, object]:
     """Map a surface into the unit square and write it; what was written, as facts."""
     points = surface.vertices if isinstance(surface, Mesh) else surface.points
-    uv = _in_unit_square(model, model.transform(points))
+
+    def transform(points: FloatArray) -> FloatArray:
+        return _in_unit_square(model, model.transform(points))
+
+    uv = transform(points)
     facts: dict[str, object] = {"file": out, "mapped_points": len(points)}
     if isinstance(surface, Mesh) and Path(out).suffix.lower() == ".obj":
-        parameterization = opened(surface, uv)
+        spans = spanning_edges(surface, uv, transform, mean_spacing(model.points_))
+        parameterization = opened(surface, uv, spans)
         facts["spanning_faces"] = int((parameterization.corners != surface.faces).any(1).sum())
         write_obj(out, surface, parameterization, texture)
     else:

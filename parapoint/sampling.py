@@ -109,6 +109,11 @@ def even_sample(mesh: Mesh, count: int, seed: int) -> FloatArray:
     return np.concatenate([vertices, added])
 
 
+def mean_spacing(points: FloatArray) -> float:
+    """Mean distance from each of (N, 3) points to its nearest other one."""
+    return float(cKDTree(points).query(points, 2)[0][:, 1].mean())
+
+
 def hull_sample(points: FloatArray, count: int, seed: int) -> FloatArray:
     """(count, 3) points spread evenly by area over the convex hull of (N, 3) points.
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+
 import igl
 import numpy as np
 from scipy.sparse import csgraph
@@ -9,6 +12,8 @@ from scipy.sparse import csgraph
 from parapoint.cutting import disk_cut, edge_graph, edge_lengths, edge_mask, path_to
 from parapoint.parameterization import Parameterization
 from parapoint.surface import BoolArray, FloatArray, IntArray, Mesh
+
+Transform = Callable[[FloatArray], FloatArray]
 
 LENGTH = 0.01
 """Shortest spanning edge, in sides of the map's square box: T_cut of the paper."""
@@ -22,17 +27,34 @@ ROUNDS = 5
 """How often the vertices of flipped faces are placed anew."""
 
 
-def spanning_edges(mesh: Mesh, uv: FloatArray) -> BoolArray:
+def spanning_edges(
+    mesh: Mesh,
+    uv: FloatArray,
+    transform: Transform | None = None,
+    spacing: float = math.inf,
+) -> BoolArray:
     """(E,) the edges of `mesh` that a map with one uv (V, 2) for each vertex draws across its seam.
 
     They are longer in the plane than T_cut, and at both ends stretched STRETCH times as much as
     the lower quartile of the edges there, so that one calm bank tells.
+
+    Of an edge that is long beside the seam's own width the ends tell little: it may reach around a
+    limb and end near where it began. With the map as a function all this holds of the pieces of
+    the edges, and an edge spans the seam where one of its pieces does.
+
+    Args:
+        mesh: the surface.
+        uv: the images of its vertices.
+        transform: maps points (N, 3) to the plane (N, 2), vertices to `uv`.
+        spacing: length of the longest piece of an edge, about that between fitted points.
     """
     start, end = mesh.edges.T
-    length = np.linalg.norm(uv[end] - uv[start], axis=1)
     real = np.linalg.norm(mesh.vertices[end] - mesh.vertices[start], axis=1)
-    stretch = length / np.maximum(real, 1e-12 * max(real.max(), 1e-300))
-    vertex = np.concatenate([start, end])
+    count = np.maximum(np.ceil(real / spacing), 1).astype(np.int64)
+    edge = np.repeat(np.arange(len(count)), count)
+    length = _piece_lengths(mesh, uv, transform, count)
+    stretch = length / np.maximum(real / count, 1e-12 * max(real.max(), 1e-300))[edge]
+    vertex = np.concatenate([start[edge], end[edge]])
     order = np.lexsort((np.tile(stretch, 2), vertex))
     degree = np.bincount(vertex, minlength=len(mesh.vertices))
     first = np.cumsum(degree) - degree
@@ -40,8 +62,25 @@ def spanning_edges(mesh: Mesh, uv: FloatArray) -> BoolArray:
     used = degree > 0
     quartile[used] = np.tile(stretch, 2)[order][(first + degree // 4)[used]]
     box = np.ptp(uv[mesh.referenced], axis=0).max()
-    calm = np.minimum(quartile[start], quartile[end])
-    return np.asarray((length > LENGTH * box) & (stretch > STRETCH * calm))
+    calm = np.minimum(quartile[start], quartile[end])[edge]
+    spans = (length > LENGTH * box) & (stretch > STRETCH * calm)
+    return np.asarray(np.bincount(edge, spans, len(count)) > 0)
+
+
+def _piece_lengths(
+    mesh: Mesh, uv: FloatArray, transform: Transform | None, count: IntArray
+) -> FloatArray:
+    """(Σ count,) lengths in the plane of the pieces of the edges, `count` (E,) of each."""
+    if transform is None or (count == 1).all():
+        start, end = mesh.edges.T
+        return np.asarray(np.linalg.norm(uv[end] - uv[start], axis=1))
+    edge = np.repeat(np.arange(len(count)), count + 1)
+    place = np.arange(len(edge)) - np.repeat(np.cumsum(count + 1) - count - 1, count + 1)
+    share = (place / count[edge])[:, None]
+    start, end = (mesh.vertices[ends] for ends in mesh.edges[edge].T)
+    images = transform((1 - share) * start + share * end)
+    steps = np.linalg.norm(np.diff(images, axis=0), axis=1)
+    return np.asarray(steps[edge[1:] == edge[:-1]])
 
 
 def spanning_faces(mesh: Mesh, uv: FloatArray) -> BoolArray:
@@ -136,14 +175,19 @@ def unfolded(mesh: Mesh, uv: FloatArray, disk: Mesh) -> FloatArray:
     return np.asarray(placed)
 
 
-def opened(mesh: Mesh, uv: FloatArray) -> Parameterization:
+def opened(mesh: Mesh, uv: FloatArray, spans: BoolArray) -> Parameterization:
     """The map of a mesh by one uv (V, 2) for each vertex, cut where edges span the learned seam.
 
     A face with one edge that does not span stays at that edge's bank: its third corner gets a uv
     of its own, where the face has its true shape. A face of three spanning edges becomes a chart
     of its own, in its true shape, beside its first corner.
+
+    Args:
+        mesh: the surface.
+        uv: the images of its vertices.
+        spans: (E,) whether an edge spans the seam (see `spanning_edges`).
     """
-    spans = spanning_edges(mesh, uv)[mesh.edge_of_halfedge].reshape(-1, 3)
+    spans = spans[mesh.edge_of_halfedge].reshape(-1, 3)
     rows = [uv]
     corners: IntArray = mesh.faces.copy()
     count = len(uv)

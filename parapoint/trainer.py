@@ -18,7 +18,7 @@ from torch import Tensor
 from parapoint import losses
 from parapoint.networks import ACTIVATIONS, Cycle, Networks, SurfaceNetworks
 from parapoint.presets import Preset
-from parapoint.sampling import hull_sample
+from parapoint.sampling import hull_sample, mean_spacing
 from parapoint.surface import FloatArray
 
 SNAPSHOTS = 100
@@ -405,11 +405,6 @@ def lattice(side: int, generator: torch.Generator) -> Tensor:
     """(side², 2) a lattice of cells in [−1, 1]², one point in each, anywhere in it."""
     cells = torch.cartesian_prod(torch.arange(side), torch.arange(side))
     return (cells + torch.rand(side * side, 2, generator=generator)) * (2 / side) - 1
-
-
-def mean_spacing(points: FloatArray) -> float:
-    """Mean distance from each of (N, 3) points to its nearest other one."""
-    return float(cKDTree(points).query(points, 2)[0][:, 1].mean())
 
 
 def oriented_normals(points: FloatArray, neighbours: int = 12) -> FloatArray:

@@ -122,9 +122,26 @@ def test_spanning_edges_are_those_across_the_tear() -> None:
     assert across.sum() == 5  # three straight ones and two diagonals
 
 
+def test_a_long_edge_is_seen_to_cross_the_seam_twice() -> None:
+    x, y = (axis.ravel() for axis in np.meshgrid([0.0, 9.0, 18.0], [0.0, 1.0], indexing="ij"))
+    faces = np.array([[0, 2, 3], [0, 3, 1], [2, 4, 5], [2, 5, 3]])
+    mesh = Mesh(np.stack([x, y, 0 * x], axis=1), faces)
+
+    def transform(points: np.ndarray) -> np.ndarray:
+        away = np.abs(points[:, 0] - 5) < 1
+        return points[:, :2] + np.where(away[:, None], [0.0, 30.0], 0.0)
+
+    uv = transform(mesh.vertices)
+    assert np.array_equal(uv, mesh.vertices[:, :2])
+    assert not spanning_edges(mesh, uv).any()
+    across = np.isclose(np.sort(mesh.vertices[mesh.edges][:, :, 0], axis=1), [0, 9]).all(axis=1)
+    assert np.array_equal(spanning_edges(mesh, uv, transform, 0.5), across)
+    assert across.sum() == 3
+
+
 def test_a_face_that_spans_the_seam_keeps_its_shape_at_one_bank() -> None:
     mesh, uv = strip()
-    result = opened(mesh, uv)
+    result = opened(mesh, uv, spanning_edges(mesh, uv))
     images, real = result.uv[result.corners], mesh.vertices[mesh.faces][:, :, :2]
     # The map is an isometry on each side, so every face now has its own shape.
     sides = np.roll(images, -1, axis=1) - images
@@ -146,7 +163,7 @@ def test_a_face_of_three_spanning_edges_becomes_a_chart() -> None:
     uv[(x > 10) & (y == 2)] += [0, 500]
     spans = spanning_edges(mesh, uv)[mesh.edge_of_halfedge].reshape(-1, 3)
     assert spans.all(axis=1).sum() == 1  # where the three parts meet
-    result = opened(mesh, uv)
+    result = opened(mesh, uv, spanning_edges(mesh, uv))
     corners = result.corners[spans.all(axis=1)][0]
     assert not set(corners) & set(range(63))
     a, b, c = result.uv[corners]
@@ -156,7 +173,8 @@ def test_a_face_of_three_spanning_edges_becomes_a_chart() -> None:
 
 def test_a_map_without_a_seam_stays_as_it_is() -> None:
     mesh, _ = strip()
-    result = opened(mesh, mesh.vertices[:, :2])
+    uv = mesh.vertices[:, :2]
+    result = opened(mesh, uv, spanning_edges(mesh, uv))
     assert np.array_equal(result.corners, mesh.faces)
 
 
