@@ -19,6 +19,8 @@ LENGTH = 0.01
 """Shortest spanning edge, in sides of the map's square box: T_cut of the paper."""
 STRETCH = 5.0
 """How many times more than the edges around either end a spanning edge is stretched."""
+MOST_PIECES = 2_000_000
+"""Pieces that all edges together are divided into at most, besides one of each."""
 IN_BAND = 0.1
 """Cost of a cut among the faces that span the seam, as a fraction of its cost elsewhere."""
 SHORTEST_BRANCH = 4
@@ -46,11 +48,13 @@ def spanning_edges(
         mesh: the surface.
         uv: the images of its vertices.
         transform: maps points (N, 3) to the plane (N, 2), vertices to `uv`.
-        spacing: length of the longest piece of an edge, about that between fitted points.
+        spacing: length of the longest piece of an edge, about that between fitted points; pieces
+            are longer where there would be too many.
     """
     start, end = mesh.edges.T
     real = np.linalg.norm(mesh.vertices[end] - mesh.vertices[start], axis=1)
-    count = np.maximum(np.ceil(real / spacing), 1).astype(np.int64)
+    longest = max(spacing, real.sum() / MOST_PIECES) if transform else math.inf
+    count = np.maximum(np.ceil(real / longest), 1).astype(np.int64)
     edge = np.repeat(np.arange(len(count)), count)
     length = _piece_lengths(mesh, uv, transform, count)
     stretch = length / np.maximum(real / count, 1e-12 * max(real.max(), 1e-300))[edge]

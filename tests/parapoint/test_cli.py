@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from parapoint import InputError, Mesh, ParaPoint, cli, files
-from parapoint.spanning import opened, spanning_edges
+from parapoint.spanning import MOST_PIECES, opened, spanning_edges
 from parapoint.testing import irregular_disk
 
 TINY = ["--preset", "paper", "--points", "150", "--subset", "100", "--iterations", "4"]
@@ -137,6 +137,18 @@ def test_a_long_edge_is_seen_to_cross_the_seam_twice() -> None:
     across = np.isclose(np.sort(mesh.vertices[mesh.edges][:, :, 0], axis=1), [0, 9]).all(axis=1)
     assert np.array_equal(spanning_edges(mesh, uv, transform, 0.5), across)
     assert across.sum() == 3
+
+
+def test_a_mesh_far_larger_than_the_spacing_is_divided_no_further_than_can_be_mapped() -> None:
+    mesh, uv = strip()
+    seen: list[int] = []
+
+    def transform(points: np.ndarray) -> np.ndarray:
+        seen.append(len(points))
+        return points[:, :2]
+
+    spanning_edges(mesh, uv, transform, 1e-12)
+    assert sum(seen) <= MOST_PIECES + 2 * len(mesh.edges)
 
 
 def test_a_face_that_spans_the_seam_keeps_its_shape_at_one_bank() -> None:
