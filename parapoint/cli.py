@@ -20,8 +20,8 @@ from parapoint.components import components
 from parapoint.errors import InputError
 from parapoint.files import read_surface, write_obj, write_points
 from parapoint.sampling import mean_spacing
-from parapoint.spanning import opened, spanning_edges
-from parapoint.surface import FloatArray, Mesh, PointCloud, Surface
+from parapoint.spanning import Transform, opened, spanning_edges
+from parapoint.surface import Mesh, PointCloud, Surface
 
 if TYPE_CHECKING:
     from parapoint import estimator
@@ -195,10 +195,7 @@ def _write(
 ) -> dict[str, object]:
     """Map a surface into the unit square and write it; what was written, as facts."""
     points = surface.vertices if isinstance(surface, Mesh) else surface.points
-
-    def transform(points: FloatArray) -> FloatArray:
-        return _in_unit_square(model, model.transform(points))
-
+    transform = _in_unit_square(model)
     uv = transform(points)
     facts: dict[str, object] = {"file": out, "mapped_points": len(points)}
     if isinstance(surface, Mesh) and Path(out).suffix.lower() == ".obj":
@@ -212,11 +209,11 @@ def _write(
     return facts
 
 
-def _in_unit_square(model: estimator.ParaPoint, uv: FloatArray) -> FloatArray:
-    """Coordinates scaled so that the map of the training points fills the unit square."""
+def _in_unit_square(model: estimator.ParaPoint) -> Transform:
+    """The model's map, scaled so that the images of the training points fill the unit square."""
     known = model.transform(model.points_)
-    low = known.min(axis=0)
-    return np.asarray((uv - low) / np.ptp(known, axis=0).max())
+    low, side = known.min(axis=0), np.ptp(known, axis=0).max()
+    return lambda points: np.asarray((model.transform(points) - low) / side)
 
 
 def _summary(model: estimator.ParaPoint) -> str:

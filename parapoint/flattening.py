@@ -231,13 +231,13 @@ def _embeddable(mesh: Mesh) -> Mesh:
         flat = ~(signed_areas(tutte(mesh), mesh.faces) > FLATTEST)
         if not flat.any():
             break
-        outer, *holes = mesh.boundary_loops
+        loops = mesh.boundary_loops
         distance, previous, _ = csgraph.dijkstra(
-            _graph(mesh), indices=outer, return_predecessors=True, min_only=True
+            _graph(mesh), indices=loops[0], return_predecessors=True, min_only=True
         )
         squeezed = np.unique(mesh.faces[flat])
         path = _path(previous, int(squeezed[distance[squeezed].argmax()]))
-        at_hole = np.flatnonzero(np.isin(path[:, 0], np.concatenate([outer[:0], *holes])))
+        at_hole = np.flatnonzero(np.isin(path[:, 0], np.concatenate(loops)))
         path = path[at_hole[-1] :] if len(at_hole) else path
         if not len(path):
             break

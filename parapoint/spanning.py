@@ -14,6 +14,7 @@ from parapoint.parameterization import Parameterization
 from parapoint.surface import BoolArray, FloatArray, IntArray, Mesh
 
 Transform = Callable[[FloatArray], FloatArray]
+"""A map of points (N, 3) to the plane (N, 2)."""
 
 LENGTH = 0.01
 """Shortest spanning edge, in sides of the map's square box: T_cut of the paper."""
@@ -47,7 +48,7 @@ def spanning_edges(
     Args:
         mesh: the surface.
         uv: the images of its vertices.
-        transform: maps points (N, 3) to the plane (N, 2), vertices to `uv`.
+        transform: the whole map, of which `uv` are values.
         spacing: length of the longest piece of an edge, about that between fitted points; pieces
             are longer where there would be too many.
     """

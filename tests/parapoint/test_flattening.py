@@ -69,6 +69,18 @@ def test_a_thin_pin_on_a_plate_is_mapped() -> None:
     assert np.median(angles_kept(flat)) > 0.9
 
 
+def test_a_strip_that_hangs_into_a_hole_is_mapped() -> None:
+    # Fifty triangles in a row: in Tutte's embedding each is a fraction of the one before.
+    x, y = (side.ravel() for side in np.meshgrid(*[np.linspace(-5, 5, 51)] * 2))
+    in_strip = (np.abs(x - 0.1) < 0.15) & (y < 1.01)
+    points = np.column_stack([x, y, 0 * x])[(np.hypot(x, y) > 4) | in_strip]
+    flat = flat_map(points)
+    assert len(flat.anchors) == len(points)
+    assert flat.facts["boundary_loops"] == 2
+    assert 1 <= flat.facts["seam_edges"] <= 10  # from the rim of the plate to the hole
+    assert np.median(angles_kept(flat)) > 0.9
+
+
 def test_the_inverse_derivatives_undo_the_derivatives() -> None:
     flat = flat_map(SPHERE)
     back = flat.jacobians @ flat.inverse_jacobians
