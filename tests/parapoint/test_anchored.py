@@ -1,7 +1,7 @@
 import numpy as np
 import torch
 
-from parapoint.anchored import AnchoredNetworks, Anchors, LocalFeatures
+from parapoint.anchored import AnchoredNetworks, Anchors, LocalFeatures, _shepard_weights
 from parapoint.networks import ACTIVATIONS
 
 JACOBIAN = np.array([[1.0, 2.0, 0.0], [0.0, 1.0, -1.0], [3.0, 0.0, 1.0]])
@@ -60,3 +60,34 @@ def test_deform_alone_has_parameters() -> None:
     generator = torch.Generator().manual_seed(0)
     net = AnchoredNetworks(50, (8,), 4, ACTIVATIONS["squareplus"], generator)
     assert {name.split(".")[0] for name, _ in net.named_parameters()} == {"deform"}
+
+
+def grid(side: int) -> np.ndarray:
+    """(side³, 3) points at distance 1 around the origin."""
+    return np.stack(np.meshgrid(*[np.arange(side) - (side - 1) / 2] * 3), axis=3).reshape(-1, 3)
+
+
+def test_a_jump_of_three_times_what_the_derivatives_allow_is_a_seam() -> None:
+    # Neighbours across x = 0 are d ≤ 2 apart, and their values d + 9, more than 3 d, as what is
+    # right of it is shifted by 9. So at x = ±0.1 the shift is that of the point's own side alone.
+    # A shift of 1 leaves d + 1 ≤ 3 d: it is no jump, and the blend is of both sides.
+    x = torch.tensor([[[0.1, 0.2, 0.3], [-0.1, 0.2, 0.3]]])
+    points = grid(6)
+    identity = np.repeat(np.eye(3)[None], len(points), axis=0)
+    for shift, expected in ((9.0, [9.0, 0.0]), (1.0, None)):
+        moved = points + [shift, 0, 0] * (points[:, :1] > 0)
+        made = (layer(Anchors(points, moved, identity))(x) - x)[0, :, 0].numpy()
+        if expected is None:
+            assert 0.1 < made[1] < 0.5 < made[0] < 0.9
+        else:
+            np.testing.assert_allclose(made, expected, atol=1e-5)
+
+
+def test_anchors_are_weighted_by_the_square_of_what_their_inverse_distance_exceeds() -> None:
+    # Distances 1 and 2, R = 4: (1 − 1/4)² and (1/2 − 1/4)² are as 9 to 1. The last one that there
+    # is may be missing; R² is then 1.5 · 4.
+    squared = torch.tensor([[1.0, 4.0, 16.0], [1.0, 4.0, torch.inf]])
+    r = 6**0.5
+    near, far = (1 - 1 / r) ** 2, (1 / 2 - 1 / r) ** 2
+    expected = torch.tensor([[0.9, 0.1], [near / (near + far), far / (near + far)]])
+    torch.testing.assert_close(_shepard_weights(squared), expected)
