@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 from scipy.sparse import csgraph
 
-from baselines.bijection import crossing_vertices
-from baselines.flattening import (
+from baselines.disks.bijection import crossing_vertices
+from baselines.disks.flattening import (
     FlatteningError,
     check_iterations,
     check_triangles,
@@ -19,19 +19,19 @@ from baselines.flattening import (
     signed_areas,
     singular_values,
 )
+from baselines.disks.slim import DENSITIES, stepper
+from baselines.disks.tutte import tutte
 from baselines.packing import by_component
-from baselines.slim import DENSITIES, stepper
-from baselines.tutte import tutte
-from parapoint import presets
-from parapoint.bijection import BijectionError, isometric_map
-from parapoint.cutting import cut_along, cut_to_disk, edge_graph, edge_lengths, path_to
+from parapoint.computed.bijection import BijectionError, isometric_map
 from parapoint.errors import InputError
 from parapoint.estimator import ParaPoint
+from parapoint.learned import presets
 from parapoint.method import UnsupportedError
-from parapoint.parameterization import Parameterization
-from parapoint.sampling import FEWEST_VERTICES
-from parapoint.spanning import learned_seam, unfolded
-from parapoint.surface import FloatArray, IntArray, Mesh, Surface
+from parapoint.surfaces.cutting import cut_along, cut_to_disk, edge_graph, edge_lengths, path_to
+from parapoint.surfaces.parameterization import Parameterization
+from parapoint.surfaces.sampling import FEWEST_VERTICES
+from parapoint.surfaces.spanning import learned_seam, unfolded
+from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, Surface
 
 ENERGY = "symmetric_dirichlet"
 DENSITY, LEAST_ENERGY = DENSITIES[ENERGY]
@@ -54,12 +54,13 @@ MOST_BRANCHES = 10
 class ParaPointSLIM:
     """SLIM on the mesh cut along the seams that ParaPoint learns; no flips, one to one.
 
-    ParaPoint maps the vertices; along its seam, made a clean path of edges (`parapoint.spanning`),
-    the mesh is cut. SLIM (M. Rabinovich et al. 2017) starts from a bijective map of small energy
-    (`parapoint.bijection`), or from ParaPoint's map where that has less and is one to one on the
-    cut mesh. A step after which the boundary would cross itself is taken anew with the vertices
-    that cross held where they are, so the map stays one to one. Then the seam grows to where the
-    map is most distorted (X. Gu et al. 2002, "Geometry images"), as long as that pays.
+    ParaPoint maps the vertices; along its seam, made a clean path of edges
+    (`parapoint.surfaces.spanning`), the mesh is cut. SLIM (M. Rabinovich et al. 2017) starts from a
+    bijective map of small energy (`parapoint.computed.bijection`), or from ParaPoint's map where
+    that has less and is one to one on the cut mesh. A step after which the boundary would cross
+    itself is taken anew with the vertices that cross held where they are, so the map stays one to
+    one. Then the seam grows to where the map is most distorted (X. Gu et al. 2002, "Geometry
+    images"), as long as that pays.
 
     A disk, with or without holes, is cut only where that pays; where its map without a cut is so
     good that none could, ParaPoint is not fitted. Components are mapped one after another.
@@ -81,7 +82,7 @@ class ParaPointSLIM:
 
     requires: ClassVar[frozenset[str]] = frozenset({"faces", "manifold", "oriented", "connected"})
     packages: ClassVar[tuple[str, ...]] = ("torch", "libigl", "shapely")
-    builds_on: ClassVar[tuple[str, ...]] = ("parapoint.estimator", "parapoint.spanning")
+    builds_on: ClassVar[tuple[str, ...]] = ("parapoint.estimator", "parapoint.surfaces.spanning")
 
     def __post_init__(self) -> None:
         _check(self.iterations, self.price)

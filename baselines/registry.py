@@ -25,31 +25,31 @@ from parapoint.errors import InputError
 from parapoint.method import REPAIRED, REQUIREMENTS, Method
 
 METHODS: dict[str, str] = {
-    "tutte": "baselines.tutte:Tutte",
-    "harmonic": "baselines.harmonic:Harmonic",
-    "lscm": "baselines.lscm:LSCM",
-    "arap": "baselines.arap:ARAP",
-    "slim": "baselines.slim:SLIM",
-    "bff": "baselines.bff:BFF",
-    "xatlas": "baselines.xatlas_charts:Xatlas",
-    "uvatlas": "baselines.uvatlas:UVAtlas",
-    "uvunwrap": "baselines.uvunwrap:UVUnwrap",
-    "blender_angle_based": "baselines.blender:BlenderAngleBased",
-    "blender_conformal": "baselines.blender:BlenderConformal",
-    "blender_minimum_stretch": "baselines.blender:BlenderMinimumStretch",
-    "blender_smart_project": "baselines.blender:BlenderSmartProject",
-    "meshlab_lscm": "baselines.meshlab:MeshLabLSCM",
-    "meshlab_harmonic": "baselines.meshlab:MeshLabHarmonic",
-    "meshlab_voronoi": "baselines.meshlab:MeshLabVoronoi",
-    "meshlab_triangles": "baselines.meshlab:MeshLabTriangles",
+    "tutte": "baselines.disks.tutte:Tutte",
+    "harmonic": "baselines.disks.harmonic:Harmonic",
+    "lscm": "baselines.disks.lscm:LSCM",
+    "arap": "baselines.disks.arap:ARAP",
+    "slim": "baselines.disks.slim:SLIM",
+    "bff": "baselines.disks.bff:BFF",
+    "xatlas": "baselines.tools.xatlas_charts:Xatlas",
+    "uvatlas": "baselines.tools.uvatlas:UVAtlas",
+    "uvunwrap": "baselines.tools.uvunwrap:UVUnwrap",
+    "blender_angle_based": "baselines.tools.blender:BlenderAngleBased",
+    "blender_conformal": "baselines.tools.blender:BlenderConformal",
+    "blender_minimum_stretch": "baselines.tools.blender:BlenderMinimumStretch",
+    "blender_smart_project": "baselines.tools.blender:BlenderSmartProject",
+    "meshlab_lscm": "baselines.tools.meshlab:MeshLabLSCM",
+    "meshlab_harmonic": "baselines.tools.meshlab:MeshLabHarmonic",
+    "meshlab_voronoi": "baselines.tools.meshlab:MeshLabVoronoi",
+    "meshlab_triangles": "baselines.tools.meshlab:MeshLabTriangles",
     "parapoint+slim": "baselines.hybrid:ParaPointSLIM",
     "automatic+slim": "baselines.hybrid:AutomaticSLIM",
     "artist+slim": "baselines.hybrid:ArtistSLIM",
     "meshed": "baselines.meshed:Meshed",
-    "external": "baselines.external:External",
+    "external": "baselines.tools.external:External",
     "parapoint": "parapoint.estimator:ParaPoint",
-    "fam": "baselines.fam:FAM",
-    "nuvo": "baselines.nuvo:Nuvo",
+    "fam": "baselines.neural.fam:FAM",
+    "nuvo": "baselines.neural.nuvo:Nuvo",
 }
 """Name -> "module:Class" of each method that comes with the benchmark."""
 
@@ -172,7 +172,7 @@ def source_hash(made: Method) -> str:
     modules = [type(made).__module__, *getattr(made, "builds_on", ())]
     sources = {k: v for module in modules for k, v in _sources(sys.modules[module]).items()}
     if made.requires & REPAIRED:
-        sources |= _sources(importlib.import_module("parapoint.preparation"))
+        sources |= _sources(importlib.import_module("parapoint.surfaces.preparation"))
     digest = hashlib.sha256()
     for name, path in sorted(sources.items()):
         text = path.read_text(encoding="utf-8").replace("\r\n", "\n")

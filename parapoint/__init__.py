@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from parapoint.errors import InputError
     from parapoint.estimator import ParaPoint
     from parapoint.method import Method
-    from parapoint.parameterization import Parameterization, PointParameterization
-    from parapoint.surface import Mesh, PointCloud
+    from parapoint.surfaces.parameterization import Parameterization, PointParameterization
+    from parapoint.surfaces.surface import Mesh, PointCloud
 
 __version__ = "0.1.0"
 __all__ = [
@@ -29,12 +29,12 @@ __all__ = [
 
 _MODULES = {
     "InputError": "errors",
-    "Mesh": "surface",
+    "Mesh": "surfaces.surface",
     "Method": "method",
     "ParaPoint": "estimator",
-    "Parameterization": "parameterization",
-    "PointCloud": "surface",
-    "PointParameterization": "parameterization",
+    "Parameterization": "surfaces.parameterization",
+    "PointCloud": "surfaces.surface",
+    "PointParameterization": "surfaces.parameterization",
 }
 
 

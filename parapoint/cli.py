@@ -16,12 +16,12 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from parapoint import console
-from parapoint.components import components
 from parapoint.errors import InputError
-from parapoint.files import read_surface, write_obj, write_points
-from parapoint.sampling import mean_spacing
-from parapoint.spanning import Transform, opened, spanning_edges
-from parapoint.surface import Mesh, PointCloud, Surface
+from parapoint.files.surfaces import read_surface, write_obj, write_points
+from parapoint.surfaces.components import components
+from parapoint.surfaces.sampling import mean_spacing
+from parapoint.surfaces.spanning import Transform, opened, spanning_edges
+from parapoint.surfaces.surface import Mesh, PointCloud, Surface
 
 if TYPE_CHECKING:
     from parapoint import estimator
@@ -140,7 +140,7 @@ def _fitted(
 ) -> estimator.ParaPoint:
     """A model fitted under a progress bar on standard error, none where that is no terminal."""
     from parapoint.estimator import ParaPoint
-    from parapoint.trainer import DivergedError
+    from parapoint.learned.trainer import DivergedError
 
     if (
         settings["components"] == "together"

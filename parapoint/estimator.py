@@ -19,20 +19,20 @@ import numpy.typing as npt
 import torch
 from scipy.spatial import cKDTree
 
-from parapoint import presets, saving
-from parapoint.anchored import AnchoredNetworks, Anchors
-from parapoint.charts import Chart, Charts
-from parapoint.components import components
+from parapoint.computed.anchored import AnchoredNetworks, Anchors
+from parapoint.computed.flattening import FlatMap, flat_map
+from parapoint.computed.reconstruction import ReconstructionError
 from parapoint.errors import InputError
-from parapoint.flattening import FlatMap, flat_map
-from parapoint.losses import DISTORTIONS, EIGENVALUES
-from parapoint.networks import ACTIVATIONS, Networks, SubNetworks, SurfaceNetworks
-from parapoint.parameterization import Parameterization, PointParameterization, TracePoint
-from parapoint.presets import SMOOTH, Preset
-from parapoint.reconstruction import ReconstructionError
-from parapoint.sampling import FEWEST_POINTS, rows_left_out, training_points
-from parapoint.surface import BoolArray, FloatArray, Mesh, PointCloud, Surface
-from parapoint.trainer import PRECISIONS, DivergedError, Step, Trainer
+from parapoint.learned import presets, saving
+from parapoint.learned.charts import Chart, Charts
+from parapoint.learned.losses import DISTORTIONS, EIGENVALUES
+from parapoint.learned.networks import ACTIVATIONS, Networks, SubNetworks, SurfaceNetworks
+from parapoint.learned.presets import SMOOTH, Preset
+from parapoint.learned.trainer import PRECISIONS, DivergedError, Step, Trainer
+from parapoint.surfaces.components import components
+from parapoint.surfaces.parameterization import Parameterization, PointParameterization, TracePoint
+from parapoint.surfaces.sampling import FEWEST_POINTS, rows_left_out, training_points
+from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, PointCloud, Surface
 
 logger = logging.getLogger("parapoint")
 
@@ -82,8 +82,8 @@ class ParaPoint:
         >>> cut = points[model.seams()]                   # the points where the surface is open
 
     Attributes:
-        preset: "paper", "fast" or "smooth"; `parapoint.presets` has every number of each. With
-            "fast" the map is computed and held by the networks; only Deform is trained.
+        preset: "paper", "fast" or "smooth"; `parapoint.learned.presets` has every number of each.
+            With "fast" the map is computed and held by the networks; only Deform is trained.
         points: training points.
         iterations: steps, the warm-up included.
         time_budget: seconds of fitting; the schedule follows the time where that ends sooner, and
@@ -97,8 +97,8 @@ class ParaPoint:
         precision: "float32" or "bfloat16" (see `Preset`).
         branches: "both", or an ablation: "3d" (3D→2D→3D alone) or "2d" (2D→3D→2D alone).
         components: "together", one map for the whole surface; "each", one for each component
-            (`parapoint.components` says what that is), side by side in the plane; or "largest",
-            whose map then holds for all points.
+            (`parapoint.surfaces.components` says what that is), side by side in the plane; or
+            "largest", whose map then holds for all points.
         seed: of every random draw.
         device: "auto", "cpu" or "cuda".
         threads: of the processor, None as torch has it.

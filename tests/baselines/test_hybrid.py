@@ -5,17 +5,17 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from baselines import hybrid, registry
-from baselines.bijection import crossing_vertices
-from baselines.flattening import signed_areas
-from benchmarks import builtin
-from benchmarks.metrics import evaluate
-from parapoint.cutting import cut_along, cut_to_disk, disk_cut, edge_lengths
+from baselines.disks.bijection import crossing_vertices
+from baselines.disks.flattening import signed_areas
+from benchmarks.cases import builtin
+from benchmarks.metrics.table import evaluate
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
-from parapoint.parameterization import Parameterization
-from parapoint.preparation import prepared
-from parapoint.spanning import learned_seam, unfolded
-from parapoint.surface import Mesh
+from parapoint.surfaces.cutting import cut_along, cut_to_disk, disk_cut, edge_lengths
+from parapoint.surfaces.parameterization import Parameterization
+from parapoint.surfaces.preparation import prepared
+from parapoint.surfaces.spanning import learned_seam, unfolded
+from parapoint.surfaces.surface import Mesh
 from parapoint.testing import irregular_disk, sphere
 
 pytest.importorskip("shapely")

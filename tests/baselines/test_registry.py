@@ -12,7 +12,7 @@ import pytest
 
 import baselines
 from baselines import registry
-from baselines.slim import SLIM
+from baselines.disks.slim import SLIM
 from parapoint.errors import InputError
 from parapoint.testing import check_method
 
@@ -104,7 +104,7 @@ others = [m for m in sys.modules if m.startswith("baselines.") and m != "baselin
 assert not others, others
 registry.names()
 registry.method("tutte")
-for name in ("torch", "xatlas", "pymeshlab", "uvunwrap", "baselines.slim"):
+for name in ("torch", "xatlas", "pymeshlab", "uvunwrap", "baselines.disks.slim"):
     assert name not in sys.modules, name
 """
     subprocess.run([sys.executable, "-c", code], check=True)
@@ -126,8 +126,12 @@ def test_source_hash_follows_the_method_s_own_modules_and_its_libraries(monkeypa
     }
     assert len(set(hashes.values())) == 3
     assert registry.source_hash(SLIM(iterations=5)) == hashes["slim"]  # parameters stand elsewhere
-    sources = registry._sources(sys.modules["baselines.slim"])
-    assert set(sources) == {"baselines.slim", "baselines.tutte", "baselines.flattening"}
+    sources = registry._sources(sys.modules["baselines.disks.slim"])
+    assert set(sources) == {
+        "baselines.disks.slim",
+        "baselines.disks.tutte",
+        "baselines.disks.flattening",
+    }
     monkeypatch.setattr(registry, "_version", lambda package: f"{package} of tomorrow")
     assert registry.source_hash(SLIM()) != hashes["slim"]
 
@@ -148,7 +152,9 @@ def test_source_hash_covers_the_preparation_of_those_that_need_one(monkeypatch):
     sources = registry._sources
 
     def without_cutting(module):
-        return {name: at for name, at in sources(module).items() if name != "parapoint.cutting"}
+        return {
+            name: at for name, at in sources(module).items() if name != "parapoint.surfaces.cutting"
+        }
 
     monkeypatch.setattr(registry, "_sources", without_cutting)
     changed, same = hashes()

@@ -3,8 +3,9 @@ import json
 import numpy as np
 import pytest
 
-from parapoint import InputError, Mesh, ParaPoint, cli, files
-from parapoint.spanning import MOST_PIECES, opened, spanning_edges
+from parapoint import InputError, Mesh, ParaPoint, cli
+from parapoint.files import surfaces as files
+from parapoint.surfaces.spanning import MOST_PIECES, opened, spanning_edges
 from parapoint.testing import irregular_disk
 
 TINY = ["--preset", "paper", "--points", "150", "--subset", "100", "--iterations", "4"]
@@ -198,7 +199,9 @@ def test_the_checkerboard_alternates() -> None:
 
 
 def test_a_diverged_fit_is_one_line(cloud, tmp_path, monkeypatch, capsys) -> None:
-    monkeypatch.setattr("parapoint.trainer.Trainer._step", lambda _: {"total": float("nan")})
+    monkeypatch.setattr(
+        "parapoint.learned.trainer.Trainer._step", lambda _: {"total": float("nan")}
+    )
     status, _, err = run(["fit", str(cloud), "--out", str(tmp_path / "m"), *TINY], capsys)
     assert status == 2
     assert "diverged twice" in err

@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 import torch
 
-from parapoint import InputError, ParaPoint, PointCloud, estimator, presets
-from parapoint.flattening import FlatMap, flat_map
-from parapoint.networks import Networks
-from parapoint.presets import PRESETS
-from parapoint.reconstruction import ReconstructionError
+from parapoint import InputError, ParaPoint, PointCloud, estimator
+from parapoint.computed.flattening import FlatMap, flat_map
+from parapoint.computed.reconstruction import ReconstructionError
+from parapoint.learned import presets
+from parapoint.learned.networks import Networks
+from parapoint.learned.presets import PRESETS
+from parapoint.learned.trainer import Trainer
 from parapoint.testing import check_method
-from parapoint.trainer import Trainer
 
 TINY = {"preset": "paper", "points": 150, "subset": 100, "iterations": 6, "device": "cpu"}
 
@@ -387,7 +388,7 @@ class KilledError(Exception):
 
 
 def test_a_killed_fit_goes_on_where_it_was(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr("parapoint.saving.CHECKPOINT_SECONDS", 0.0)
+    monkeypatch.setattr("parapoint.learned.saving.CHECKPOINT_SECONDS", 0.0)
     points = paraboloid()
     whole = ParaPoint(**TINY).fit(points)
     seen = []
