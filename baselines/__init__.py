@@ -60,8 +60,8 @@ What a method may count on, and what it must keep:
   any other error is a `failed` row with its message.
 - `trace` may hold energies and maps on the way; `report` what should stand beside the result.
 - `packages` names the libraries whose versions are part of the method: results are run anew when
-  one changes, as they are when the method's own source does. `builds_on` names modules of other
-  packages whose source counts as its own.
+  one changes, as they are when the method's own source does, or that of what it imports from its
+  own package or from this project.
 
 A program that reads and writes OBJ files needs no code; it is run by
 `external(command="tool {input} {output}")`.

@@ -82,7 +82,6 @@ class ParaPointSLIM:
 
     requires: ClassVar[frozenset[str]] = frozenset({"faces", "manifold", "oriented", "connected"})
     packages: ClassVar[tuple[str, ...]] = ("torch", "libigl", "shapely")
-    builds_on: ClassVar[tuple[str, ...]] = ("parapoint.estimator", "parapoint.surfaces.spanning")
 
     def __post_init__(self) -> None:
         _check(self.iterations, self.price)

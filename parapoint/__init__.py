@@ -27,7 +27,7 @@ __all__ = [
     "PointParameterization",
 ]
 
-_MODULES = {
+LAZY = {
     "InputError": "errors",
     "Mesh": "surfaces.surface",
     "Method": "method",
@@ -36,9 +36,10 @@ _MODULES = {
     "PointCloud": "surfaces.surface",
     "PointParameterization": "surfaces.parameterization",
 }
+"""The module, under `parapoint`, of each name that this package offers."""
 
 
 def __getattr__(name: str) -> object:
-    if name not in _MODULES:
+    if name not in LAZY:
         raise AttributeError(f"module 'parapoint' has no attribute {name!r}")
-    return getattr(importlib.import_module(f"parapoint.{_MODULES[name]}"), name)
+    return getattr(importlib.import_module(f"parapoint.{LAZY[name]}"), name)

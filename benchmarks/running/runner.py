@@ -25,8 +25,8 @@ from benchmarks.running.cluster import WORKER_LOST
 from benchmarks.running.tasks import Executor, Task
 from benchmarks.store.results import MISSING, SOURCE_CHANGED, ResultRow, Store, identity, plain
 from parapoint.errors import InputError
-from parapoint.files import surfaces as files
 from parapoint.files.surfaces import faults_of, read_parameterized
+from parapoint.sources import source_hash
 
 TIME_LIMIT = 1800.0
 """Seconds a cell may take unless said otherwise."""
@@ -35,8 +35,6 @@ METRICS_TIME_LIMIT = 120.0
 SLOW = ("torch", "pymeshlab")
 """Packages that are slow to import and start no thread by it: cells of methods that import them are
 forked from a process that has them."""
-READERS = ("surfaces", "mesh_formats", "point_formats")
-"""Modules of `parapoint` that make a surface of a file."""
 
 
 @dataclass(frozen=True)
@@ -280,7 +278,7 @@ def _check_readable(cases: Sequence[str], store: Store) -> None:
     Raises:
         InputError: a file cannot be read, or every model is missing.
     """
-    known, readers = store.surface_hashes(), _readers_hash()
+    known, readers = store.surface_hashes(), source_hash("parapoint.files.surfaces")
     missing = []
     for case in cases:
         try:
@@ -295,7 +293,7 @@ def _check_readable(cases: Sequence[str], store: Store) -> None:
 def _surfaces(store: Store, cases: Sequence[str], summary: Summary) -> dict[str, str]:
     """The hash of each case's surface, stored; "" where the model is missing."""
     hashes = {}
-    known, readers = store.surface_hashes(), _readers_hash()
+    known, readers = store.surface_hashes(), source_hash("parapoint.files.surfaces")
     before = dict(known)
     for case in cases:
         origin = _origin(case, readers)
@@ -335,13 +333,6 @@ def _origin(case: str, readers: str) -> str:
     with faults_of(path), path.open("rb") as stream:
         content = hashlib.file_digest(stream, "sha256").hexdigest()
     return f"{content} {path.suffix.lower()} {readers}"
-
-
-def _readers_hash() -> str:
-    """Hash of the source that makes a surface of a file."""
-    folder = Path(files.__file__).parent
-    texts = [path.read_bytes() for path in sorted(folder.glob("*.py")) if path.stem in READERS]
-    return hashlib.sha256(b"".join(texts)).hexdigest()[:16]
 
 
 def _todo(

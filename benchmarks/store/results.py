@@ -19,21 +19,17 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import errno
-import functools
 import hashlib
-import inspect
 import io
 import json
 import logging
 import math
 import os
 import re
-import sys
 import typing
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -50,6 +46,7 @@ from benchmarks.store.archives import (
     write_arrays,
 )
 from parapoint.errors import InputError
+from parapoint.sources import source_hash
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization
 from parapoint.surfaces.surface import Mesh, PointCloud, Surface
 
@@ -422,7 +419,7 @@ class Store:
 
     def _metrics_keys(self, rows: Sequence[ResultRow]) -> dict[str, str]:
         """What the metrics of each row depend on, by its id: map, any reference, their source."""
-        source = _metrics_source()
+        source = source_hash("benchmarks.metrics.table")
         references = {path.stem for path in (self.folder / "references").glob("*.npz")}
         exact = {path.stem for path in (self.folder / "exact").glob("*.npz")}
         texts = {
@@ -633,27 +630,3 @@ def _metric_names() -> list[str]:
     from benchmarks.metrics.table import METRICS
 
     return list(METRICS)
-
-
-@functools.cache
-def _metrics_source() -> str:
-    """Hash of the source that the metrics are computed with: their modules of this project."""
-    from benchmarks.metrics import table as metrics
-
-    found: dict[str, ModuleType] = {}
-    pending: list[ModuleType] = [metrics]
-    while pending:
-        module = pending.pop()
-        if module.__name__ in found:
-            continue
-        found[module.__name__] = module
-        for value in vars(module).values():
-            name = getattr(value, "__module__", None) or getattr(value, "__name__", "")
-            if isinstance(name, str) and name.split(".")[0] in {"benchmarks", "parapoint"}:
-                other = sys.modules.get(name)
-                if other is not None:
-                    pending.append(other)
-    digest = hashlib.sha256()
-    for _, module in sorted(found.items()):
-        digest.update(inspect.getsource(module).encode())
-    return digest.hexdigest()

@@ -26,6 +26,7 @@ from benchmarks.metrics.seams import spanning_edges
 from benchmarks.metrics.table import MapState
 from benchmarks.store.results import ResultRow, Store
 from parapoint.errors import InputError
+from parapoint.sources import source_hash
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, PointCloud, edge_table
 from reports.contents import Contents
@@ -268,15 +269,6 @@ def _ending(kind: str) -> str:
     return "js" if kind == VIEWED else "webp"
 
 
-def source_hash(*modules: str) -> str:
-    """Hash of the source of the report, or of some of its modules."""
-    digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parents[1].rglob("*.py")):
-        if not modules or path.stem in modules:
-            digest.update(path.read_bytes())
-    return digest.hexdigest()
-
-
 def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
     """Draw the pictures of the suite that `folder` lacks; what could not be drawn, and why.
 
@@ -285,7 +277,7 @@ def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
     folder.mkdir(parents=True, exist_ok=True)
     record = folder / "keys.json"
     known = known_keys(record)
-    source = source_hash("render", "drawing", "clouds", "viewer")
+    source = source_hash(__name__)
     with_heat = not contents.is_large
     work: list[tuple[list[ResultRow], list[str]]] = []
     keys: dict[str, str] = {}

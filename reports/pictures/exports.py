@@ -16,10 +16,11 @@ from benchmarks.store.results import ResultRow
 from parapoint.cli import checkerboard
 from parapoint.errors import InputError
 from parapoint.files.surfaces import complete_file, write_obj
+from parapoint.sources import source_hash
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh
 from reports.contents import Contents
-from reports.pictures.drawing import known_keys, slug, source_hash
+from reports.pictures.drawing import known_keys, slug
 
 KINDS = ("obj", "glb")
 
@@ -43,7 +44,7 @@ def write(contents: Contents, report: Path) -> list[str]:
     record = report / "exports" / slug(contents.suite) / "keys.json"
     record.parent.mkdir(parents=True, exist_ok=True)
     known = known_keys(record)
-    source = source_hash("exports")
+    source = source_hash(__name__)
     keys, faults = {}, []
     for row in contents.rows:
         if row.status != "ok":

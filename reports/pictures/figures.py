@@ -24,9 +24,10 @@ from PIL import Image as Images
 from pypdf import PdfWriter
 
 from benchmarks.store.results import ResultRow
+from parapoint.sources import source_hash
 from reports.contents import SHEETS, Contents
 from reports.pictures.clouds import DENSE, SPARSE
-from reports.pictures.drawing import known_keys, slug, source_hash
+from reports.pictures.drawing import known_keys, slug
 from reports.pictures.galleries import (
     ablation,
     ablation_of_the_paper,
@@ -300,7 +301,7 @@ def draw(contents: Contents, pictures: Path, folder: Path, jobs: int) -> list[Dr
     folder.mkdir(parents=True, exist_ok=True)
     record = folder / "keys.json"
     known = known_keys(record)
-    source = source_hash()
+    source = source_hash(__name__)
     keys, changed = {}, []
     planned = drawings(contents, pictures)
     for drawing in planned:
