@@ -207,7 +207,7 @@ def test_method_of_a_missing_package_is_unsupported(monkeypatch):
         ("meshlab", "pymeshlab"),
     ):
         gone = Missing(f"needs the package {name}: pip install {name}")
-        monkeypatch.setattr(f"baselines.{module}.{name}", gone)
+        monkeypatch.setattr(f"baselines.tools.{module}.{name}", gone)
     for spec in (
         *("xatlas", "uvatlas", "uvunwrap"),
         *("meshlab_lscm", "meshlab_harmonic", "meshlab_voronoi", "meshlab_triangles"),

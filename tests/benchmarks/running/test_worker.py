@@ -154,7 +154,7 @@ def test_a_supervisor_does_one_cell_after_another(tmp_path, forks):
     spec = registry.register_plugin(plugin)
     source_hash = registry.source_hash(registry.method(spec)[1])
     receive, send = os.pipe()
-    code = f"from benchmarks import worker; worker.FORKS = {forks}; worker.main()"
+    code = f"from benchmarks.running import worker; worker.FORKS = {forks}; worker.main()"
     process = subprocess.Popen(
         [sys.executable, "-c", code, str(send)],
         stdin=subprocess.PIPE,

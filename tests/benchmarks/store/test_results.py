@@ -352,7 +352,7 @@ def test_metrics_follow_the_map_and_their_own_source(store, monkeypatch):
     row = add(store, stretched)
     assert [found.id for found in store.unmeasured()] == [row.id]
     assert store.metrics()["quasi_conformal_mean"][0] == pytest.approx(2)
-    monkeypatch.setattr(results, "_metrics_source", lambda: "another")
+    monkeypatch.setattr(results, "source_hash", lambda _: "another")
     assert [found.id for found in store.unmeasured()] == [row.id]
 
 

@@ -10,7 +10,7 @@ from reports.page import viewer
 from reports.pictures import render
 from reports.pictures.drawing import Map
 
-from .conftest import ball, flat, sheet
+from ..conftest import ball, flat, sheet
 
 
 def eights(text):

@@ -9,7 +9,7 @@ from reports.pictures.clouds import surface_points
 from reports.pictures.drawing import FIELDS, Map, normal_colours
 from reports.pictures.render import Scene
 
-from .conftest import ball, flat, lonlat, sheet
+from ..conftest import ball, flat, lonlat, sheet
 
 
 def test_points_lie_on_the_surface_and_as_dense_everywhere():

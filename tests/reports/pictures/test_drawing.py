@@ -12,7 +12,7 @@ from reports.pictures import drawing as pictures
 from reports.pictures import render
 from reports.pictures.drawing import Map, draw, heat, map_file, slug
 
-from .conftest import HAND, HOSTILE, NEFERTITI, Writer, ball, flat, lonlat, sheet
+from ..conftest import HAND, HOSTILE, NEFERTITI, Writer, ball, flat, lonlat, sheet
 
 
 def test_slugs_are_safe_and_distinct():

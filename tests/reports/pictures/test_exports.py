@@ -7,7 +7,7 @@ from parapoint.files.surfaces import read_parameterized
 from reports.contents import contents
 from reports.pictures import exports
 
-from .conftest import HAND, Writer, ball, flat, lonlat, sheet
+from ..conftest import HAND, Writer, ball, flat, lonlat, sheet
 
 
 @pytest.mark.parametrize(("mesh", "result"), [(sheet(), flat(sheet())), (ball(), lonlat(ball()))])

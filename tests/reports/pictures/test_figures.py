@@ -13,7 +13,7 @@ from reports.pictures.figures import draw, drawings, write
 from reports.pictures.galleries import leading
 from reports.pictures.style import figure, look, plain_log, wrapped
 
-from .conftest import HAND, NEFERTITI, Writer, flat, sheet
+from ..conftest import HAND, NEFERTITI, Writer, flat, sheet
 
 
 @pytest.fixture

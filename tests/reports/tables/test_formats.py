@@ -11,7 +11,7 @@ from reports.contents import contents
 from reports.tables.formats import comma_separated, html, latex, latex_text, markdown
 from reports.tables.suites import everything, tables
 
-from .conftest import HOSTILE
+from ..conftest import HOSTILE
 from .test_table import table
 
 

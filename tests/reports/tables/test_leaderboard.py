@@ -11,7 +11,7 @@ from reports.contents import (
 )
 from reports.tables.leaderboard import SHOWN, data, definition, glances, winner
 
-from .conftest import DEVIL, HAND, HOSTILE, NEFERTITI
+from ..conftest import DEVIL, HAND, HOSTILE, NEFERTITI
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import pytest
 from reports.contents import contents
 from reports.tables.published import claim_text, published_values, verdicts
 
-from .conftest import DEVIL, HAND, NEFERTITI
+from ..conftest import DEVIL, HAND, NEFERTITI
 
 
 def test_published_values_and_claims():

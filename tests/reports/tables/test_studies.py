@@ -17,7 +17,7 @@ from reports.tables.studies import (
     success,
 )
 
-from .conftest import DEVIL, HAND, NEFERTITI, Writer, ball, flat, lonlat, sheet
+from ..conftest import DEVIL, HAND, NEFERTITI, Writer, ball, flat, lonlat, sheet
 
 
 def test_a_pair_by_hand():

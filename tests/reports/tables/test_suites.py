@@ -3,7 +3,7 @@ import pytest
 from reports.contents import contents
 from reports.tables.suites import comparison, conformality, failures, supplement
 
-from .conftest import DEVIL, HAND, HOSTILE, NEFERTITI
+from ..conftest import DEVIL, HAND, HOSTILE, NEFERTITI
 
 
 def test_conformality_keeps_published_figures_apart(results):
