@@ -159,7 +159,7 @@ def _start(job: dict[str, Any], send: int, private: list[int]) -> int:
     """Start the child of a cell, which answers on `send`; its process id."""
     if not FORKS:
         process = subprocess.Popen(  # noqa: S603  our own module
-            [sys.executable, "-c", f"from benchmarks import worker; worker.cell({send})"],
+            [sys.executable, "-c", f"from benchmarks.running import worker; worker.cell({send})"],
             stdin=subprocess.PIPE,
             start_new_session=True,
             pass_fds=[send],
