@@ -45,16 +45,18 @@ class Reached(NamedTuple):
 
 
 def race(case: str, seconds: float, *, seed: int = 0) -> Iterator[Reached]:
-    """What `fast` and `smooth` reach on a mesh, and the straightforward way at 1, 2, 4, ... steps.
+    """What the computed map and the preset `learned` reach on a mesh, and the straightforward way.
 
-    `fast` takes what it takes, `smooth` has `seconds` by the clock, the straightforward one
-    `seconds` of processor time.
+    The computed map takes what it takes, `learned` has `seconds` by the clock, and the
+    straightforward way, told at 1, 2, 4, ... steps, `seconds` of processor time.
 
     Raises:
         InputError: there is no such model, or it is no mesh.
     """
-    from parapoint.estimator import ParaPoint
+    from parapoint.computed.computed_map import ComputedMap
+    from parapoint.learned.parapoint import ParaPoint
     from parapoint.learned.presets import PAPER
+    from parapoint.surfaces.frame import Frame
     from parapoint.surfaces.sampling import training_points
 
     mesh = models.load(case)
@@ -64,16 +66,19 @@ def race(case: str, seconds: float, *, seed: int = 0) -> Iterator[Reached]:
     def angle_difference(uv: FloatArray) -> float:
         return evaluate(mesh, Parameterization(uv, mesh.faces))["angle_difference_mean"]
 
-    for preset, budget in (("fast", None), ("smooth", seconds)):
+    rivals = {
+        "computed": ComputedMap(seed=seed),
+        "learned": ParaPoint("learned", time_budget=seconds, seed=seed, device="cpu"),
+    }
+    for name, rival in rivals.items():
         begin = time.process_time()
-        model = ParaPoint(preset=preset, time_budget=budget, seed=seed, device="cpu").fit(mesh)
+        model = rival.fit(mesh)
         spent = time.process_time() - begin
-        uv = model.transform(mesh.vertices)
-        yield Reached(preset, int(str(model.report_["iterations"])), spent, angle_difference(uv))
+        steps = int(str(model.report_.get("iterations", 0)))
+        yield Reached(name, steps, spent, angle_difference(model.transform(mesh.vertices)))
     points = training_points(mesh, PAPER.points, seed)
-    centre = (points.min(axis=0) + points.max(axis=0)) / 2
-    scale = np.linalg.norm(points - centre, axis=1).max()
-    maps = straightforward_maps((points - centre) / scale, (mesh.vertices - centre) / scale, seed)
+    frame = Frame.of(points)
+    maps = straightforward_maps(frame.inside(points), frame.inside(mesh.vertices), seed)
     shown = 1
     for iteration, (spent, uv) in enumerate(maps, start=1):
         if iteration == shown or spent >= seconds:
