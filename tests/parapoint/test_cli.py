@@ -209,7 +209,9 @@ def test_where_no_map_can_be_computed_one_is_trained_and_a_line_says_so(
     rng = np.random.default_rng(0)
     parts = [np.column_stack([rng.uniform(0, 1, (150, 2)), np.zeros(150)]) for _ in range(3)]
     path = tmp_path / "three.xyz"
-    np.savetxt(path, np.concatenate([part + np.array([100 * k, 0, 0]) for k, part in enumerate(parts)]))
+    np.savetxt(
+        path, np.concatenate([part + np.array([100 * k, 0, 0]) for k, part in enumerate(parts)])
+    )
     target = tmp_path / "out.npz"
     arguments = ["unwrap", str(path), "--out", str(target), "--time-budget", "2", "--json"]
     status, out, _ = run(arguments, capsys)

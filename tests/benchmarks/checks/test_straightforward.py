@@ -22,10 +22,10 @@ def test_it_trains() -> None:
 
 
 def test_the_table_has_a_row_for_each_thing_reached(monkeypatch) -> None:
-    rows = [straightforward.Reached("fast", 100, 8.14, 0.02851)]
+    rows = [straightforward.Reached("computed", 100, 8.14, 0.02851)]
     monkeypatch.setattr(straightforward, "race", lambda *_: iter(rows))
     cells = [list(column.cells) for column in race_table("camelhead", 1.0).columns]
-    assert cells == [["fast"], ["100"], ["8.1"], ["0.0285"]]
+    assert cells == [["computed"], ["100"], ["8.1"], ["0.0285"]]
 
 
 def test_a_race_needs_a_model_that_is_a_mesh(tmp_path) -> None:
