@@ -14,9 +14,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from parapoint import fitting, saving
+from parapoint import fitting
 from parapoint.errors import InputError
 from parapoint.fitting import COMPONENTS, Fitted, Progress, Session, SurfaceMap
+from parapoint.learned import saving
 from parapoint.parameters import check_choice, check_number, check_whole
 from parapoint.surfaces.frame import Frame
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization, TracePoint

@@ -122,3 +122,14 @@ def test_anti_flip_loss_counts_neighbours_that_turn_away() -> None:
 def test_unfolding_loss_by_hand(J: list[list[float]], expected: float) -> None:
     images = tensor(J)[:, None].repeat(1, 3, 1)
     assert float(losses.unfolding_loss(images)) == pytest.approx(expected, abs=1e-6)
+
+
+def test_unwrap_loss_holds_the_box_fixed() -> None:
+    # As above: the pair at distance 0.25 is in each other's sum, 2 (1 − d) / 4 in all, so its two
+    # points have slopes ±1/2 along x. The other two, which span the box, are in no sum: were L(Q)
+    # not held fixed, a smaller box would lower the loss, and they would be drawn in.
+    uv = tensor([[0.0, 0.0], [0.25, 0.0], [4.0, 0.0], [0.0, 4.0]], requires_grad=True)
+    losses.unwrap_loss(uv, 2, 0.5).backward()
+    expected = tensor([[0.5, 0.0], [-0.5, 0.0], [0.0, 0.0], [0.0, 0.0]])
+    assert uv.grad is not None
+    torch.testing.assert_close(uv.grad, expected)

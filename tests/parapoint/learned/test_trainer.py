@@ -6,12 +6,14 @@ import pytest
 import torch
 
 from parapoint.learned import losses, trainer
+from parapoint.learned.networks import Cycle, GridBranch
 from parapoint.learned.presets import PAPER
 from parapoint.learned.trainer import (
     AdamW,
     DivergedError,
     Trainer,
     lattice,
+    objective_terms,
     oriented_normals,
     tangent_frames,
 )
@@ -233,3 +235,27 @@ def test_the_unfolding_term_counts_only_with_a_weight() -> None:
     terms = next(of.run()).losses
     assert of.weights["unfolding"] == 0.1
     assert 0 <= terms["unfolding"] <= 2
+
+
+def test_the_last_phase_fills_the_time_that_its_own_steps_fit_in(monkeypatch) -> None:
+    # Steps of 4 s on the hull, which lasts until 5 of 20 s are over: two of them. Then steps of
+    # 1 s: 12 more fit. Judged by the longest step of the hull, the run would end after 9 of them.
+    times = iter([0.0, 4.0, *range(8, 40)])
+    monkeypatch.setattr(trainer.time, "perf_counter", lambda: float(next(times)))
+    preset = replace(TINY, warm_up=0.25, all_from=1.0)
+    of = Trainer(sphere(), preset, seed=0, device="cpu", time_budget=20.0)
+    steps = list(of.run())
+    assert [step.phase for step in steps] == ["hull"] * 2 + ["subset"] * 12
+    assert of.seconds == 20.0
+
+
+def test_the_wrapped_lattice_is_held_against_all_points() -> None:
+    # As in the tests of the losses: two points made, three given, 5 / 3 from given to made. Of the
+    # first two given points alone it would be (0 + 1) / 2.
+    made = torch.tensor([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    given = torch.tensor([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 5.0]])
+    uv, axes = made[:, :2], torch.eye(3)[:2, None].expand(2, 2, 3)
+    cycle = Cycle(None, GridBranch(uv, made, made, axes, made, uv))
+    terms = objective_terms(replace(PAPER, anti_flip_neighbours=1), cycle, given)
+    assert float(terms["wrap"]) == pytest.approx(5 / 3, rel=1e-5)
+    assert float(terms["cycle"]) == 0
