@@ -14,10 +14,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from parapoint import fitting
+from parapoint import fitting, saving
 from parapoint.errors import InputError
 from parapoint.fitting import COMPONENTS, Fitted, Progress, Session, SurfaceMap
-from parapoint.learned import saving
 from parapoint.parameters import check_choice, check_number, check_whole
 from parapoint.surfaces.frame import Frame
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization, TracePoint

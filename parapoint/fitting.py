@@ -40,7 +40,7 @@ class SurfaceMap(Protocol):
         ...
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Everything that `parapoint.learned.saving` keeps of the map as arrays, by name."""
+        """Everything that `parapoint.saving` keeps of the map as arrays, by name."""
         ...
 
     def facts(self) -> dict[str, Any]:

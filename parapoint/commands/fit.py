@@ -8,9 +8,9 @@ from typing import Any
 
 import click
 
+from parapoint import saving
 from parapoint.commands.fitting import estimator_of, fitted, summary
 from parapoint.files.surfaces import read_surface
-from parapoint.learned import saving
 
 
 @click.command()

@@ -11,8 +11,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from parapoint import saving
 from parapoint.errors import InputError
-from parapoint.learned import saving
 from parapoint.learned.trainer import Trainer
 from parapoint.surfaces.parameterization import TracePoint
 from parapoint.surfaces.surface import FloatArray

@@ -334,7 +334,7 @@ def _inline(content: object) -> Markup:
 
 def _templates() -> Environment:
     return Environment(
-        loader=PackageLoader("reports.page.pages"),
+        loader=PackageLoader("reports.page"),
         autoescape=select_autoescape(default=True, default_for_string=True),
         undefined=StrictUndefined,
         trim_blocks=True,
