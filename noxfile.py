@@ -93,4 +93,4 @@ def bench(session: nox.Session) -> None:
 def regress(session: nox.Session) -> None:
     """Compare the metric values of every deterministic method with the golden ones."""
     install(session)
-    session.run("python", "-m", "benchmarks.regress", *session.posargs)
+    session.run("python", "-m", "benchmarks.checks.regress", *session.posargs)

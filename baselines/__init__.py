@@ -44,7 +44,7 @@ To share it, put this `pyproject.toml` beside it; wherever the folder is install
 What a method may count on, and what it must keep:
 
 - A mesh is manifold, oriented, connected, ... only if `requires` says so. One that is not is made
-  so, the same way for every method (`parapoint.preparation`): its components come in turn,
+  so, the same way for every method (`parapoint.surfaces.preparation`): its components come in turn,
   and with `disk_after_cut` closed ones and those with handles come cut to a disk, disks with holes
   as they are. With `disk`, what is no disk is not handed over, and its row is `skipped`.
 - Vertices may be duplicate or unreferenced, triangles thin, scales any. Arrays are read-only.
@@ -54,14 +54,14 @@ What a method may count on, and what it must keep:
   machine. A method that cannot promise it says `deterministic: ClassVar[bool] = False`.
 - Only `parameterize` is timed: import libraries at the top of the file, and what takes seconds to
   import or start in a method `preload(self)`, which is called before the clock. One that need not
-  be installed is imported by `baselines.optional.optional`, so that its rows are `skipped`, say
-  what to install, and are tried again by the next run.
+  be installed is imported by `baselines.tools.optional.optional`, so that its rows are `skipped`,
+  say what to install, and are tried again by the next run.
 - Raise `UnsupportedError` for what the method cannot take though `requires` admits it (`skipped`);
   any other error is a `failed` row with its message.
 - `trace` may hold energies and maps on the way; `report` what should stand beside the result.
 - `packages` names the libraries whose versions are part of the method: results are run anew when
-  one changes, as they are when the method's own source does. `builds_on` names modules of other
-  packages whose source counts as its own.
+  one changes, as they are when the method's own source does, or that of what it imports from its
+  own package or from this project.
 
 A program that reads and writes OBJ files needs no code; it is run by
 `external(command="tool {input} {output}")`.

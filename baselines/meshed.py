@@ -9,16 +9,16 @@ import igl
 import numpy as np
 from scipy.spatial import cKDTree
 
-from baselines.flattening import FlatteningError
-from baselines.lscm import LSCM
-from baselines.meshlab import pymeshlab
-from baselines.slim import SLIM
-from baselines.xatlas_charts import Xatlas
+from baselines.disks.flattening import FlatteningError
+from baselines.disks.lscm import LSCM
+from baselines.disks.slim import SLIM
+from baselines.tools.meshlab import pymeshlab
+from baselines.tools.xatlas_charts import Xatlas
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
-from parapoint.parameterization import Parameterization, PointParameterization
-from parapoint.preparation import prepared
-from parapoint.surface import BoolArray, FloatArray, Mesh, PointCloud, Surface
+from parapoint.surfaces.parameterization import Parameterization, PointParameterization
+from parapoint.surfaces.preparation import prepared
+from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, PointCloud, Surface
 
 FLATTENINGS: dict[str, Xatlas | LSCM | SLIM] = {"xatlas": Xatlas(), "lscm": LSCM(), "slim": SLIM()}
 

@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from parapoint.parameterization import Parameterization
-from parapoint.preparation import shelves
-from parapoint.surface import FloatArray, IntArray, Mesh
+from parapoint.surfaces.parameterization import Parameterization
+from parapoint.surfaces.preparation import shelves
+from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 
 
 def by_component(mesh: Mesh, mapped: Callable[[Mesh], Parameterization]) -> Parameterization:

@@ -21,35 +21,37 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal, Union, cast, get_args, get_origin, get_type_hints
 
+from parapoint import sources
 from parapoint.errors import InputError
 from parapoint.method import REPAIRED, REQUIREMENTS, Method
 
 METHODS: dict[str, str] = {
-    "tutte": "baselines.tutte:Tutte",
-    "harmonic": "baselines.harmonic:Harmonic",
-    "lscm": "baselines.lscm:LSCM",
-    "arap": "baselines.arap:ARAP",
-    "slim": "baselines.slim:SLIM",
-    "bff": "baselines.bff:BFF",
-    "xatlas": "baselines.xatlas_charts:Xatlas",
-    "uvatlas": "baselines.uvatlas:UVAtlas",
-    "uvunwrap": "baselines.uvunwrap:UVUnwrap",
-    "blender_angle_based": "baselines.blender:BlenderAngleBased",
-    "blender_conformal": "baselines.blender:BlenderConformal",
-    "blender_minimum_stretch": "baselines.blender:BlenderMinimumStretch",
-    "blender_smart_project": "baselines.blender:BlenderSmartProject",
-    "meshlab_lscm": "baselines.meshlab:MeshLabLSCM",
-    "meshlab_harmonic": "baselines.meshlab:MeshLabHarmonic",
-    "meshlab_voronoi": "baselines.meshlab:MeshLabVoronoi",
-    "meshlab_triangles": "baselines.meshlab:MeshLabTriangles",
+    "tutte": "baselines.disks.tutte:Tutte",
+    "harmonic": "baselines.disks.harmonic:Harmonic",
+    "lscm": "baselines.disks.lscm:LSCM",
+    "arap": "baselines.disks.arap:ARAP",
+    "slim": "baselines.disks.slim:SLIM",
+    "bff": "baselines.disks.bff:BFF",
+    "xatlas": "baselines.tools.xatlas_charts:Xatlas",
+    "uvatlas": "baselines.tools.uvatlas:UVAtlas",
+    "uvunwrap": "baselines.tools.uvunwrap:UVUnwrap",
+    "blender_angle_based": "baselines.tools.blender:BlenderAngleBased",
+    "blender_conformal": "baselines.tools.blender:BlenderConformal",
+    "blender_minimum_stretch": "baselines.tools.blender:BlenderMinimumStretch",
+    "blender_smart_project": "baselines.tools.blender:BlenderSmartProject",
+    "meshlab_lscm": "baselines.tools.meshlab:MeshLabLSCM",
+    "meshlab_harmonic": "baselines.tools.meshlab:MeshLabHarmonic",
+    "meshlab_voronoi": "baselines.tools.meshlab:MeshLabVoronoi",
+    "meshlab_triangles": "baselines.tools.meshlab:MeshLabTriangles",
     "parapoint+slim": "baselines.hybrid:ParaPointSLIM",
     "automatic+slim": "baselines.hybrid:AutomaticSLIM",
     "artist+slim": "baselines.hybrid:ArtistSLIM",
     "meshed": "baselines.meshed:Meshed",
-    "external": "baselines.external:External",
-    "parapoint": "parapoint.estimator:ParaPoint",
-    "fam": "baselines.fam:FAM",
-    "nuvo": "baselines.nuvo:Nuvo",
+    "external": "baselines.tools.external:External",
+    "parapoint": "parapoint.learned.parapoint:ParaPoint",
+    "computed": "parapoint.computed.computed_map:ComputedMap",
+    "fam": "baselines.neural.fam:FAM",
+    "nuvo": "baselines.neural.nuvo:Nuvo",
 }
 """Name -> "module:Class" of each method that comes with the benchmark."""
 
@@ -163,24 +165,14 @@ def describe(name: str) -> Description:
 def source_hash(made: Method) -> str:
     """Hash of what determines a method's results beside its parameters, the same on any machine.
 
-    It covers the source of the method's module and of the modules of the same package that this
-    one imports, directly or not, the same of the modules that the class names in `builds_on`, and
-    the versions of the packages that it names in `packages`. For ParaPoint it is thus the whole of
-    `parapoint` that it uses. Where the surface may be changed before the method sees it, it covers
-    how.
+    It covers the source of the method's module, of all that this one imports from this project or
+    from its own package, and the versions of the libraries that the class names in `packages`.
+    Where the surface may be changed before the method sees it, it covers how.
     """
-    modules = [type(made).__module__, *getattr(made, "builds_on", ())]
-    sources = {k: v for module in modules for k, v in _sources(sys.modules[module]).items()}
+    modules = [type(made).__module__]
     if made.requires & REPAIRED:
-        sources |= _sources(importlib.import_module("parapoint.preparation"))
-    digest = hashlib.sha256()
-    for name, path in sorted(sources.items()):
-        text = path.read_text(encoding="utf-8").replace("\r\n", "\n")
-        # A plugin file's module name holds its path, which is no part of its identity.
-        digest.update(f"{name if '.' in name else path.name}\n{text}\n".encode())
-    for package in getattr(made, "packages", ()):
-        digest.update(f"{package} {_version(package)}\n".encode())
-    return digest.hexdigest()[:16]
+        modules.append("parapoint.surfaces.preparation")
+    return sources.source_hash(*modules, packages=getattr(made, "packages", ()))
 
 
 def imports(made: Method, package: str) -> bool:
@@ -326,40 +318,3 @@ def _method_class(module: ModuleType, class_name: str, where: str) -> type[Metho
             f"{', '.join(sorted(REQUIREMENTS))}; it is {requires!r}"
         )
     return cast("type[Method]", kind)
-
-
-def _sources(module: ModuleType) -> dict[str, Path]:
-    """Source file of a module and of the modules of its package that it imports, by name."""
-    package = module.__name__.partition(".")[0]
-    assert module.__file__ is not None
-    sources = {module.__name__: Path(module.__file__)}
-    left = [module.__name__]
-    while left:
-        for name in _imported(sources[left.pop()].read_text(encoding="utf-8")):
-            if name.partition(".")[0] != package or name in sources or name == package:
-                continue
-            path = Path(sys.modules[package].__path__[0], *name.split(".")[1:]).with_suffix(".py")
-            if path.is_file():
-                sources[name] = path
-                left.append(name)
-    return sources
-
-
-@functools.cache
-def _imported(source: str) -> tuple[str, ...]:
-    """Names that the source of a module imports, whether they are modules or what is in them."""
-    names: list[str] = []
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Import):
-            names += [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
-    return tuple(names)
-
-
-def _version(package: str) -> str:
-    """Version of an installed package without its local part (as in 2.13.0+cpu), or "absent"."""
-    try:
-        return metadata.version(package).partition("+")[0]
-    except metadata.PackageNotFoundError:
-        return "absent"

@@ -12,8 +12,8 @@ from parapoint import console
 from parapoint.errors import InputError
 
 if TYPE_CHECKING:
-    from benchmarks.runner import Summary
-    from benchmarks.suites import Suite
+    from benchmarks.cases.suites import Suite
+    from benchmarks.running.runner import Summary
 
 SUITE = "paper"
 """What `run` runs if nothing is named."""
@@ -111,8 +111,8 @@ def run(
 
     A second run goes on where the first one ended. Results of all runs stay in the folder.
     """
-    from benchmarks import suites
-    from benchmarks.display import BAD
+    from benchmarks.cases import suites
+    from benchmarks.commands.display import BAD
 
     if suite is None and cases is not None:
         chosen = suites.Suite(
@@ -135,8 +135,8 @@ def run(
 
 def _shown_run(suite: Suite, out: Path, **options: Any) -> Summary:
     """Run a suite in view of the user."""
-    from benchmarks import runner
-    from benchmarks.display import Display, print_summary
+    from benchmarks.commands.display import Display, print_summary
+    from benchmarks.running import runner
 
     with Display() as progress:
         summary = runner.run(suite, out, progress=progress, **options)
@@ -148,8 +148,8 @@ def _shown_run(suite: Suite, out: Path, **options: Any) -> Summary:
 @click.argument("what", type=click.Choice(["suites", "cases", "methods", "metrics"]))
 def list_(what: str) -> None:
     """Show what there is."""
-    from benchmarks.display import print_table
-    from benchmarks.listing import LISTS
+    from benchmarks.commands.display import print_table
+    from benchmarks.commands.listing import LISTS
 
     print_table(LISTS[what]())
 
@@ -159,7 +159,7 @@ def list_(what: str) -> None:
 @click.pass_context
 def check(ctx: click.Context, folder: Path) -> None:
     """Verify every row of a results folder against its files, and a sample of its metrics."""
-    from benchmarks.results import Store
+    from benchmarks.store.results import Store
 
     if not (folder / "runs.jsonl").is_file():
         raise InputError(f"{folder} is no results folder: it has no runs.jsonl")
@@ -180,7 +180,7 @@ def check(ctx: click.Context, folder: Path) -> None:
 @click.pass_context
 def score(ctx: click.Context, arguments: tuple[str, ...]) -> None:
     """Every metric of an existing UV map."""
-    from benchmarks.score import score as command
+    from benchmarks.commands.score import score as command
 
     with command.make_context(f"{ctx.command_path}", list(arguments), parent=ctx.parent) as inner:
         command.invoke(inner)
@@ -207,13 +207,13 @@ def score(ctx: click.Context, arguments: tuple[str, ...]) -> None:
 )
 def speed(figure: Path | None, race: str | None, seconds: float) -> None:
     """How fast the heavy parts are, measured now: metrics, methods, and ParaPoint's training."""
-    from benchmarks.display import print_table
-    from benchmarks.method_speed import overhead_table, overheads
-    from benchmarks.metric_speed import growth_figure, metric_costs, metric_table
-    from benchmarks.speed import training_table
+    from benchmarks.commands.display import print_table
+    from benchmarks.commands.method_speed import overhead_table, overheads
+    from benchmarks.commands.metric_speed import growth_figure, metric_costs, metric_table
+    from benchmarks.commands.speed import training_table
 
     if race is not None:
-        from benchmarks.straightforward import race_table
+        from benchmarks.checks.straightforward import race_table
 
         print_table(race_table(race, seconds))
         return

@@ -10,14 +10,16 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from parapoint.computed.computed_map import ComputedMap
     from parapoint.errors import InputError
-    from parapoint.estimator import ParaPoint
+    from parapoint.learned.parapoint import ParaPoint
     from parapoint.method import Method
-    from parapoint.parameterization import Parameterization, PointParameterization
-    from parapoint.surface import Mesh, PointCloud
+    from parapoint.surfaces.parameterization import Parameterization, PointParameterization
+    from parapoint.surfaces.surface import Mesh, PointCloud
 
 __version__ = "0.1.0"
 __all__ = [
+    "ComputedMap",
     "InputError",
     "Mesh",
     "Method",
@@ -27,18 +29,20 @@ __all__ = [
     "PointParameterization",
 ]
 
-_MODULES = {
+LAZY = {
+    "ComputedMap": "computed.computed_map",
     "InputError": "errors",
-    "Mesh": "surface",
+    "Mesh": "surfaces.surface",
     "Method": "method",
-    "ParaPoint": "estimator",
-    "Parameterization": "parameterization",
-    "PointCloud": "surface",
-    "PointParameterization": "parameterization",
+    "ParaPoint": "learned.parapoint",
+    "Parameterization": "surfaces.parameterization",
+    "PointCloud": "surfaces.surface",
+    "PointParameterization": "surfaces.parameterization",
 }
+"""The module, under `parapoint`, of each name that this package offers."""
 
 
 def __getattr__(name: str) -> object:
-    if name not in _MODULES:
+    if name not in LAZY:
         raise AttributeError(f"module 'parapoint' has no attribute {name!r}")
-    return getattr(importlib.import_module(f"parapoint.{_MODULES[name]}"), name)
+    return getattr(importlib.import_module(f"parapoint.{LAZY[name]}"), name)

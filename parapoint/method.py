@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import ClassVar, Protocol, runtime_checkable
 
-from parapoint.parameterization import Parameterization, PointParameterization
-from parapoint.surface import Mesh, PointCloud, Surface
+from parapoint.surfaces.parameterization import Parameterization, PointParameterization
+from parapoint.surfaces.surface import Mesh, PointCloud, Surface
 
 
 @runtime_checkable
@@ -80,11 +80,12 @@ REQUIREMENTS: dict[str, Callable[[Surface], str | None]] = {
 
 What is not `manifold` (at most two faces at an edge, one fan at a vertex), `oriented` (neighbouring
 faces turn alike) or `connected` is made so before the method sees it, the same way for every
-method, and the row says how (`parapoint.preparation`). `disk` takes a disk as it is and nothing
-else. `disk_after_cut` asks for all of these and takes what is cut to a disk: a surface that is one,
-with or without holes, comes as it is. `seams` admits meshes that came with a UV map, and the method
-finds in `Mesh.seams` where that is cut; no other method is shown them. `points` takes clouds.
+method, and the row says how (`parapoint.surfaces.preparation`). `disk` takes a disk as it is and
+nothing else. `disk_after_cut` asks for all of these and takes what is cut to a disk: a surface that
+is one, with or without holes, comes as it is. `seams` admits meshes that came with a UV map, and
+the method finds in `Mesh.seams` where that is cut; no other method is shown them. `points` takes
+clouds.
 """
 
 REPAIRED = frozenset({"manifold", "oriented", "connected", "disk_after_cut"})
-"""The words that `parapoint.preparation` makes true of a mesh."""
+"""The words that `parapoint.surfaces.preparation` makes true of a mesh."""

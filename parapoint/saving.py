@@ -1,54 +1,53 @@
-"""Fitted models and the states of runs on disk: JSON facts beside safetensors."""
+"""Fitted models on disk: JSON facts beside arrays, checked before use."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import safetensors
-import safetensors.torch
-from torch import Tensor
+import safetensors.numpy
 
 from parapoint.errors import InputError
-from parapoint.parameterization import TracePoint
-from parapoint.trainer import Trainer
 
-FORMAT = 4
+FORMAT = 5
 """Version of saved models and checkpoints."""
-CHECKPOINT_SECONDS = 60.0
 
 
-def write(folder: Path, stem: str, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
-    """Write `stem.json` and the tensors it names, so that a kill leaves the old pair or the new."""
+def write(folder: Path, stem: str, arrays: dict[str, np.ndarray], facts: dict[str, Any]) -> None:
+    """Write `stem.json` and the arrays it names, so that a kill leaves the old pair or the new.
+
+    The arrays that the old `stem.json` names are removed; every other file of the folder stays.
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    data = safetensors.torch.save({k: t.contiguous().cpu() for k, t in tensors.items()})
-    name = f"{stem}-{hashlib.sha256(data).hexdigest()[:16]}.safetensors"
+    old = _named_arrays(folder / f"{stem}.json")
+    data = safetensors.numpy.save({k: np.asarray(of, order="C") for k, of in arrays.items()})
+    name = f"{stem}-{_digest(data)}.safetensors"
     text = json.dumps({"format": FORMAT, "tensors": name, **facts}, indent=1)
     for path, content in ((folder / name, data), (folder / f"{stem}.json", text.encode())):
         temporary = path.with_name(path.name + ".part")
         temporary.write_bytes(content)
         temporary.replace(path)
-    for old in folder.glob(f"{stem}-*.safetensors"):
-        if old.name != name:
-            old.unlink()
+    if old is not None and old.name != name:
+        old.unlink(missing_ok=True)
 
 
-def read(folder: Path, stem: str) -> tuple[dict[str, Tensor], dict[str, Any]]:
+def read(folder: Path, stem: str) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """What `write` wrote.
 
     Raises:
-        InputError: there is no such pair, it is damaged, or of another version.
+        InputError: there is no such pair, it is damaged or changed, or of another version.
     """
     path = folder / f"{stem}.json"
     if not path.is_file():
         raise InputError(f"{folder}: no saved model here ({stem}.json is missing)")
     with damage_of(folder):
-        facts = json.loads(path.read_text())
+        facts = json.loads(path.read_text(encoding="utf-8"))
         version = facts["format"]
     if version != FORMAT:
         raise InputError(
@@ -56,9 +55,52 @@ def read(folder: Path, stem: str) -> tuple[dict[str, Tensor], dict[str, Any]]:
         )
     with damage_of(folder):
         name = facts["tensors"]
-        if Path(name).name != name:
+        if not isinstance(name, str) or Path(name).name != name:
             raise InputError(f"{path}: names tensors outside of its folder: {name!r}")
-        return safetensors.torch.load((folder / name).read_bytes()), facts
+        data = (folder / name).read_bytes()
+        if name != f"{stem}-{_digest(data)}.safetensors":
+            raise InputError(
+                f"{folder / name}: damaged: its content does not fit its name; fit anew"
+            )
+        return safetensors.numpy.load(data), facts
+
+
+def remove(folder: Path, stem: str) -> None:
+    """Remove the pair that `write` wrote, and the folder's other files stay."""
+    arrays = _named_arrays(folder / f"{stem}.json")
+    (folder / f"{stem}.json").unlink(missing_ok=True)
+    if arrays is not None:
+        arrays.unlink(missing_ok=True)
+
+
+def check_free(folder: Path, stem: str) -> None:
+    """Raise InputError where something that `write` did not write is in its way."""
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder}: is a file; name a folder")
+    path = folder / f"{stem}.json"
+    if path.exists() and _named_arrays(path) is None:
+        raise InputError(f"{path}: is in the way and not ours; name another folder")
+
+
+def _named_arrays(path: Path) -> Path | None:
+    """The file of arrays that a `stem.json` of ours names; None where it is no such file."""
+    try:
+        facts = json.loads(path.read_text(encoding="utf-8"))
+        name = facts["tensors"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    stem = path.stem
+    is_ours = (
+        isinstance(name, str)
+        and Path(name).name == name
+        and name.startswith(f"{stem}-")
+        and name.endswith(".safetensors")
+    )
+    return path.with_name(name) if is_ours else None
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()[:16]
 
 
 @contextmanager
@@ -72,49 +114,9 @@ def damage_of(folder: Path) -> Iterator[None]:
         ValueError,
         OSError,
         RuntimeError,
+        AttributeError,
         safetensors.SafetensorError,
     ) as error:
         if isinstance(error, InputError):
             raise
         raise InputError(f"{folder}: damaged, fit anew or delete it ({error})") from error
-
-
-class Checkpoint:
-    """The state of a run in a folder, written each minute."""
-
-    def __init__(self, folder: Path, identity: str) -> None:
-        self.folder, self.identity = folder, identity
-        self.written = time.monotonic()
-
-    def read(self) -> tuple[dict[str, Tensor], dict[str, Any]] | None:
-        """The state of an earlier session of this run, None where there is none.
-
-        Raises:
-            InputError: the state is of another run, of another version, or damaged.
-        """
-        if not (self.folder / "checkpoint.json").is_file():
-            return None
-        tensors, facts = read(self.folder, "checkpoint")
-        if facts.get("identity") != self.identity:
-            raise InputError(
-                f"{self.folder}: holds the checkpoint of a run with other points or settings; "
-                "delete it or choose another folder"
-            )
-        return tensors, facts
-
-    def write_each_minute(self, trainer: Trainer, trace: tuple[TracePoint, ...]) -> None:
-        """Write the state if the last one is a minute old. Maps in the trace are not kept."""
-        if time.monotonic() - self.written < CHECKPOINT_SECONDS:
-            return
-        facts = {
-            "identity": self.identity,
-            "trainer": trainer.facts(),
-            "trace": [[t.iteration, t.seconds, dict(t.values)] for t in trace],
-        }
-        write(self.folder, "checkpoint", trainer.tensors(), facts)
-        self.written = time.monotonic()
-
-    def remove(self) -> None:
-        """Remove the state: the run is done."""
-        for path in self.folder.glob("checkpoint*"):
-            path.unlink()

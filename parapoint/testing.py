@@ -10,11 +10,11 @@ from typing import Any, cast
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from parapoint.cutting import cut_along, disk_cut
 from parapoint.method import REQUIREMENTS, Method, MissingError, UnsupportedError
-from parapoint.parameterization import Parameterization, PointParameterization
-from parapoint.preparation import prepared
-from parapoint.surface import FloatArray, IntArray, Mesh, PointCloud, Surface
+from parapoint.surfaces.cutting import cut_along, disk_cut
+from parapoint.surfaces.parameterization import Parameterization, PointParameterization
+from parapoint.surfaces.preparation import prepared
+from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, PointCloud, Surface
 
 SEED = 7
 
@@ -24,7 +24,8 @@ def check_method(method: Method, surface: Surface | None = None) -> None:
 
     - It is a dataclass, its parameters and its report can be written as JSON, it can be pickled.
     - `requires` has known words only and is honest: what it admits is parameterized (as
-      `parapoint.preparation` hands it over); a method that needs faces raises on a point cloud.
+      `parapoint.surfaces.preparation` hands it over); a method that needs faces raises on a point
+      cloud.
     - The map has the type for the surface, is finite and not collapsed to a line, and its faces and
       corners are in the order of the mesh.
     - The same seed gives the same map, bit by bit, unless the method says that it is not

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from benchmarks.environment import cores
+from benchmarks.running.environment import cores
 from parapoint import console
 
 

@@ -14,12 +14,12 @@ from typing import Any
 
 import pandas as pd
 
-from benchmarks.metrics import METRICS
-from benchmarks.results import ResultRow, Store
-from benchmarks.suites import SUITES
+from benchmarks.cases.suites import SUITES
+from benchmarks.metrics.table import METRICS
+from benchmarks.store.results import ResultRow, Store
 from parapoint.errors import InputError
-from parapoint.parameterization import Parameterization
-from parapoint.surface import Mesh, PointCloud
+from parapoint.surfaces.parameterization import Parameterization
+from parapoint.surfaces.surface import Mesh, PointCloud
 
 ANGLE, AREA = "angle_difference_mean", "area_discrepancy_total"
 FLIPPED, SPANNING = "flipped_fraction", "spanning_fraction"
@@ -47,7 +47,8 @@ DISPLAY: dict[str, tuple[str, str]] = {
     "fam": ("FAM", ""),
     "artist+slim": ("Artist's cut + SLIM", ""),
     "automatic+slim": ("Automatic cut + SLIM", ""),
-    "parapoint+slim": ("ParaPoint + SLIM", ""),
+    "parapoint+slim": ("Computed cut + SLIM", ""),
+    "computed": ("Computed map", ""),
     "parapoint": ("ParaPoint", ""),
 }
 """Name of a method in print and, where its parameters do not say it, what it minimises.

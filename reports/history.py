@@ -14,15 +14,15 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from benchmarks import regress
-from benchmarks.metrics import METRICS
-from benchmarks.results import ResultRow
+from benchmarks.checks import regress
+from benchmarks.metrics.table import METRICS
+from benchmarks.store.results import ResultRow
 from parapoint.errors import InputError
-from reports import formats
 from reports.contents import Contents, contents
-from reports.pictures import slug
-from reports.table import Column, Table, Value, metric_title
-from reports.tables import SUMMARY_METRICS
+from reports.pictures.drawing import slug
+from reports.tables import formats
+from reports.tables.suites import SUMMARY_METRICS
+from reports.tables.table import Column, Table, Value, metric_title
 
 Floats = npt.NDArray[np.float64]
 

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from reports import exports, figures, formats, page, pictures, tables
 from reports.contents import contents
+from reports.page import pages as page
+from reports.pictures import drawing as pictures
+from reports.pictures import exports, figures
+from reports.tables import formats
+from reports.tables import suites as tables
 
 
 def write(folder: Path, *, jobs: int, textured: bool = False) -> Path:

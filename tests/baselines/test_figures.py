@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from baselines import registry
-from baselines.flattening import signed_areas
-from parapoint.preparation import prepared
+from baselines.disks.flattening import signed_areas
+from parapoint.surfaces.preparation import prepared
 
 
 def model(name):
-    models = pytest.importorskip("benchmarks.models")
+    models = pytest.importorskip("benchmarks.cases.models")
     try:
         return models.load(name)
     except models.MissingModelError as error:

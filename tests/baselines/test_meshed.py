@@ -5,13 +5,13 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from baselines import registry
-from baselines.flattening import FlatteningError
+from baselines.disks.flattening import FlatteningError
 from baselines.meshed import carried
 from baselines.packing import by_component
 from parapoint.method import UnsupportedError
-from parapoint.parameterization import Parameterization
-from parapoint.preparation import prepared
-from parapoint.surface import Mesh, PointCloud
+from parapoint.surfaces.parameterization import Parameterization
+from parapoint.surfaces.preparation import prepared
+from parapoint.surfaces.surface import Mesh, PointCloud
 from parapoint.testing import irregular_disk
 
 

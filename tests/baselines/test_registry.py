@@ -12,7 +12,8 @@ import pytest
 
 import baselines
 from baselines import registry
-from baselines.slim import SLIM
+from baselines.disks.slim import SLIM
+from parapoint import sources
 from parapoint.errors import InputError
 from parapoint.testing import check_method
 
@@ -104,7 +105,7 @@ others = [m for m in sys.modules if m.startswith("baselines.") and m != "baselin
 assert not others, others
 registry.names()
 registry.method("tutte")
-for name in ("torch", "xatlas", "pymeshlab", "uvunwrap", "baselines.slim"):
+for name in ("torch", "xatlas", "pymeshlab", "uvunwrap", "baselines.disks.slim"):
     assert name not in sys.modules, name
 """
     subprocess.run([sys.executable, "-c", code], check=True)
@@ -126,34 +127,25 @@ def test_source_hash_follows_the_method_s_own_modules_and_its_libraries(monkeypa
     }
     assert len(set(hashes.values())) == 3
     assert registry.source_hash(SLIM(iterations=5)) == hashes["slim"]  # parameters stand elsewhere
-    sources = registry._sources(sys.modules["baselines.slim"])
-    assert set(sources) == {"baselines.slim", "baselines.tutte", "baselines.flattening"}
-    monkeypatch.setattr(registry, "_version", lambda package: f"{package} of tomorrow")
+    monkeypatch.setattr(sources, "version", lambda package: f"{package} of tomorrow")
     assert registry.source_hash(SLIM()) != hashes["slim"]
-
-
-def test_source_hash_follows_what_a_method_builds_on(monkeypatch):
-    name, made = registry.method("parapoint+slim")
-    assert name == "parapoint+slim"
-    before = registry.source_hash(made)
-    monkeypatch.setattr(type(made), "builds_on", ())
-    assert registry.source_hash(made) != before
 
 
 def test_source_hash_covers_the_preparation_of_those_that_need_one(monkeypatch):
     def hashes():
-        return [registry.source_hash(registry.method(name)[1]) for name in ("lscm", "xatlas")]
+        specs = ("lscm", "external(command='tool {input} {output}')")
+        return [registry.source_hash(registry.method(spec)[1]) for spec in specs]
 
-    lscm, xatlas = hashes()
-    sources = registry._sources
+    lscm, external = hashes()
+    found = sources.sources
 
-    def without_cutting(module):
-        return {name: at for name, at in sources(module).items() if name != "parapoint.cutting"}
+    def without_preparation(*modules):
+        return found(*(name for name in modules if name != "parapoint.surfaces.preparation"))
 
-    monkeypatch.setattr(registry, "_sources", without_cutting)
+    monkeypatch.setattr(sources, "sources", without_preparation)
     changed, same = hashes()
     assert changed != lscm
-    assert same == xatlas
+    assert same == external
 
 
 @pytest.mark.usefixtures("_no_plugins")
@@ -240,7 +232,8 @@ def test_installed_package_that_cannot_be_imported_says_so(tmp_path, monkeypatch
     [
         ("tutte", set()),
         ("parapoint", {"torch"}),
-        ("automatic+slim", {"torch"}),
+        ("computed", set()),
+        ("fam", {"torch"}),
         ("meshlab_lscm", {"pymeshlab"}),
         ("meshed", {"pymeshlab"}),
     ],

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from benchmarks import __main__ as commands
-from benchmarks import models, runner, suites
-from benchmarks.archives import map_arrays, write_arrays
-from benchmarks.results import Store
+from benchmarks.cases import models, suites
+from benchmarks.running import runner
+from benchmarks.store.archives import map_arrays, write_arrays
+from benchmarks.store.results import Store
 from parapoint import console
 from parapoint.errors import InputError
 

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import instant
-from benchmarks.runner import run
-from benchmarks.score import read_point_map
-from benchmarks.suites import Suite
+from benchmarks.cases.suites import Suite
+from benchmarks.checks import instant
+from benchmarks.commands.score import read_point_map
+from benchmarks.running.runner import run
 from parapoint.errors import InputError
 
 OFF = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"

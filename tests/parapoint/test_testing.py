@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from parapoint.method import REQUIREMENTS, UnsupportedError
-from parapoint.parameterization import Parameterization, PointParameterization, TracePoint
-from parapoint.preparation import prepared
-from parapoint.surface import Mesh, PointCloud
+from parapoint.surfaces.parameterization import Parameterization, PointParameterization, TracePoint
+from parapoint.surfaces.preparation import prepared
+from parapoint.surfaces.surface import Mesh, PointCloud
 from parapoint.testing import check_method, irregular_disk, sample_surfaces
 
 

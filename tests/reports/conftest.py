@@ -10,11 +10,12 @@ import igl
 import numpy as np
 import pytest
 
-from benchmarks.archives import arrays_hash, map_arrays, trace_arrays, write_arrays
-from benchmarks.results import ResultRow, Store, identity
-from parapoint.parameterization import Parameterization, TracePoint
-from parapoint.surface import Mesh
-from reports import clouds, pictures, render, style
+from benchmarks.store.archives import arrays_hash, map_arrays, trace_arrays, write_arrays
+from benchmarks.store.results import ResultRow, Store, identity
+from parapoint.surfaces.parameterization import Parameterization, TracePoint
+from parapoint.surfaces.surface import Mesh
+from reports.pictures import clouds, render, style
+from reports.pictures import drawing as pictures
 from reports.report import write
 
 HAND, DEVIL, NEFERTITI = "hand_1_i_f5000", "mannequin-devil", "nefertiti-lowres_odedstein"

@@ -12,7 +12,7 @@ pytest.importorskip("playwright", reason="playwright is not installed")
 from playwright.sync_api import sync_playwright
 
 from reports.contents import contents
-from reports.pictures import Map
+from reports.pictures.drawing import Map
 
 from .conftest import HAND, NEFERTITI
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from parapoint import console
-from parapoint.parameterization import Parameterization, PointParameterization
-from parapoint.surface import PointCloud
+from parapoint.surfaces.parameterization import Parameterization, PointParameterization
+from parapoint.surfaces.surface import PointCloud
 from reports.__main__ import main
 from reports.contents import contents
 from reports.report import write

@@ -1,0 +1,1 @@
+"""Classical methods that flatten a disk, each one equation and one file."""

@@ -1,0 +1,32 @@
+"""Whether a map of a planar domain without flips is one to one, and SLIM that keeps it so."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from baselines.tools.optional import optional
+from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
+
+shapely = optional("shapely", "pip install shapely")
+
+
+def crossing_vertices(disk: Mesh, uv: FloatArray) -> IntArray:
+    """Ends of the boundary edges that touch or cross others, but for neighbours at their vertex.
+
+    Without flips no point of the plane is covered more often than the boundary winds around it
+    (its degree), so a map of a disk, with or without holes, is one to one if and only if the
+    images of its boundary loops neither cross nor touch: if none is returned.
+
+    Args:
+        disk: a planar domain.
+        uv: (V, 2) a map of it without flips.
+
+    Raises:
+        UnsupportedError: shapely is not installed.
+    """
+    start = np.concatenate(disk.boundary_loops)
+    end = np.concatenate([np.roll(loop, -1) for loop in disk.boundary_loops])
+    segments = shapely.linestrings(np.stack([uv[start], uv[end]], axis=1))
+    one, other = shapely.STRtree(segments).query(segments, predicate="intersects")
+    apart = (start[one] != start[other]) & (start[one] != end[other]) & (end[one] != start[other])
+    return np.unique([start[one[apart]], end[one[apart]]])

@@ -1,0 +1,184 @@
+"""Scalable locally injective mappings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import perf_counter
+from typing import ClassVar, Literal
+
+import igl
+import numpy as np
+
+from baselines.disks.flattening import (
+    Domain,
+    FlatteningError,
+    check_iterations,
+    check_triangles,
+    domain,
+    frames,
+    is_kept,
+    signed_areas,
+    singular_values,
+)
+from baselines.disks.tutte import tutte
+from parapoint.computed.bijection import LARGE
+from parapoint.errors import InputError
+from parapoint.surfaces.parameterization import Parameterization, TracePoint
+from parapoint.surfaces.surface import FloatArray, IntArray, Surface
+
+Density = Callable[[FloatArray, FloatArray], FloatArray]
+
+DENSITIES: dict[str, tuple[Density, float]] = {
+    "symmetric_dirichlet": (lambda s1, s2: s1**2 + s1**-2 + s2**2 + s2**-2, 4.0),
+    "conformal": (lambda s1, s2: (s1 / s2 + s2 / s1) / 2, 1.0),
+    "log_arap": (lambda s1, s2: np.log(s1) ** 2 + np.log(s2) ** 2, 0.0),
+    "exp_conformal": (lambda s1, s2: (s1 / s2 + s2 / s1) / 2, 1.0),
+}
+"""Energy of a triangle by its singular values (table 1 of the paper), and the least value.
+
+The energy of a map is the area-weighted mean; for `exp_conformal` the logarithm of the mean of
+exp(density), which would overflow at a far start.
+"""
+
+
+@dataclass(frozen=True)
+class SLIM:
+    """SLIM from Tutte's embedding: no triangle ever flips.
+
+    M. Rabinovich et al. 2017, "Scalable locally injective mappings", as libigl solves it; the
+    longest boundary loop is free after the start. libigl gives a start with flips back unchanged
+    and says nothing, so the start is checked before and the fall of the energy after.
+
+    libigl weighs `exp_conformal` by the gradient of the symmetric Dirichlet energy, so that its
+    maps are nearer to isometric than the name says.
+
+    Attributes:
+        energy: what is minimised; its value is in the trace at each step.
+        iterations: steps, at least 1.
+    """
+
+    energy: Literal["symmetric_dirichlet", "conformal", "log_arap", "exp_conformal"] = (
+        "symmetric_dirichlet"
+    )
+    iterations: int = 20
+
+    requires: ClassVar[frozenset[str]] = frozenset({"faces", "disk_after_cut"})
+    packages: ClassVar[tuple[str, ...]] = ("libigl",)
+
+    def __post_init__(self) -> None:
+        check_iterations(self.iterations)
+        if self.energy not in DENSITIES:
+            raise InputError(f"energy must be one of {', '.join(DENSITIES)}, not {self.energy!r}")
+
+    def parameterize(self, surface: Surface, *, seed: int) -> Parameterization:  # noqa: ARG002 (nothing is random)
+        """The map, in the scale of the surface, with the energy of each step.
+
+        Raises:
+            UnsupportedError: the surface is no disk, with or without holes.
+            InputError: a triangle has no area.
+            FlatteningError: the start has flipped triangles, or the energy did not fall.
+        """
+        began = perf_counter()
+        disk = domain(surface)
+        check_triangles(disk.vertices, disk.faces)
+        start = tutte(disk)
+        folded = int((signed_areas(start, disk.faces) <= 0).sum())
+        if folded:
+            raise FlatteningError(
+                f"SLIM needs a start without flips; Tutte's embedding has {folded} flipped or "
+                f"degenerate triangles of {len(disk.faces)}"
+            )
+        return self.improved(disk, start, began)
+
+    def improved(self, disk: Domain, start: FloatArray, began: float) -> Parameterization:
+        """The map after all steps from a flip-free `start` (V, 2) in the scale of the surface.
+
+        Args:
+            disk: the surface.
+            start: (V, 2), each triangle with positive area.
+            began: `perf_counter()` when the method began.
+
+        Raises:
+            FlatteningError: the energy did not fall.
+        """
+        frame = frames(disk)
+        weight = 1 / (2 * np.abs(np.linalg.det(frame)) * disk.area)
+
+        def energy(uv: FloatArray) -> float:
+            return map_energy(self.energy, weight, *singular_values(frame, uv, disk.faces))
+
+        stepped = stepper(disk, start, self.energy)
+        uv = start
+        trace = [TracePoint(0, perf_counter() - began, {self.energy: energy(start)}, start)]
+        for step in range(1, self.iterations + 1):
+            uv = stepped(1)
+            kept = uv if is_kept(step, self.iterations) else None
+            seconds = perf_counter() - began
+            trace.append(TracePoint(step, seconds, {self.energy: energy(uv)}, kept))
+        first, last = trace[0].values[self.energy], trace[-1].values[self.energy]
+        least = DENSITIES[self.energy][1]
+        # A start that is the minimum cannot fall (a flat regular polygon).
+        if not (last < first or first <= least + 1e-9):
+            raise FlatteningError(
+                f"SLIM's {self.energy} energy did not fall in {self.iterations} iterations: "
+                f"{first:.6g} at the start, {last:.6g} at the end"
+            )
+        report: dict[str, object] = {
+            "energy": self.energy,
+            "start": "tutte",
+            "start_energy": first,
+            "end_energy": last,
+            "iterations": self.iterations,
+        }
+        return Parameterization(uv, disk.faces, tuple(trace), report)
+
+
+def stepper(
+    disk: Domain,
+    uv: FloatArray,
+    energy: str,
+    held: IntArray | None = None,
+    weight: float = 0.0,
+) -> Callable[[int], FloatArray]:
+    """A function that takes so many more of libigl's steps and gives the map (V, 2).
+
+    The unit of the surface makes no difference: see `parapoint.computed.bijection.LARGE`.
+
+    Args:
+        disk: the surface.
+        uv: (V, 2) where it starts, without flips.
+        energy: key of DENSITIES.
+        held: (n,) vertices that are drawn to where they start.
+        weight: of that pull.
+    """
+    fixed = np.zeros(0, dtype=np.int64) if held is None else held
+    scale = LARGE / disk.area**0.5
+    state = igl.slim_precompute(
+        np.asfortranarray(scale * disk.vertices),
+        np.asfortranarray(disk.faces.astype(np.int32)),
+        np.asfortranarray(scale * uv),
+        igl.MappingEnergyType.__members__[energy.upper()],
+        fixed.astype(np.int32),
+        np.asfortranarray(scale * uv[fixed]),
+        weight,
+    )
+    return lambda steps: np.ascontiguousarray(igl.slim_solve(state, steps) / scale)
+
+
+def map_energy(name: str, weight: FloatArray, s1: FloatArray, s2: FloatArray) -> float:
+    """Energy of a map: the mean of the triangles' energies, infinite where one is flipped.
+
+    Args:
+        name: key of DENSITIES.
+        weight: (F,) share of each triangle in the 3D area.
+        s1: (F,) larger singular values.
+        s2: (F,) smaller singular values, negative where a triangle is flipped.
+    """
+    if not (s2 > 0).all():
+        return float("inf")
+    density = DENSITIES[name][0](s1, s2)
+    if name == "exp_conformal":
+        largest = float(density.max())
+        return largest + float(np.log((weight * np.exp(density - largest)).sum()))
+    return float((weight * density).sum())

@@ -1,0 +1,1 @@
+"""Neural maps by other authors, trained for one shape at a time."""

@@ -1,0 +1,1 @@
+"""Methods that other programs and libraries provide."""

@@ -1,0 +1,1 @@
+"""What is mapped: real models, surfaces made in memory, and suites of both."""

@@ -1,0 +1,197 @@
+"""Each table as data: which models, which methods, which seeds."""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass
+
+from benchmarks.cases.builtin import BUILTIN
+from benchmarks.cases.models import registry
+from parapoint.errors import InputError
+
+
+@dataclass(frozen=True)
+class Suite:
+    """A table to run.
+
+    Attributes:
+        name: how it is called for.
+        title: heading of its table.
+        cases: canonical names of models, in the order of the rows.
+        methods: specs, `name` or `name(key=value, ...)`, in the order of the columns.
+        seeds: seeds, each of which is one cell.
+    """
+
+    name: str
+    title: str
+    cases: tuple[str, ...]
+    methods: tuple[str, ...]
+    seeds: tuple[int, ...] = (0,)
+
+
+ISOMETRIC = "slim(energy=symmetric_dirichlet)"
+ONE_ITERATION = "slim(energy=symmetric_dirichlet, iterations=1)"
+CONFORMAL = "slim(energy=conformal)"
+
+MESH_METHODS = ("tutte", "lscm", ISOMETRIC, CONFORMAL, "xatlas")
+
+# What the suites can afford of ParaPoint on two cores; the full budget is 10,000 of each.
+REDUCED = "points=4096, iterations=2800, subset=256, all_from=0.997"
+PAPER_REDUCED = f"parapoint(preset=paper, {REDUCED})"
+PAPER_SHORT = "parapoint(preset=paper, points=2048, iterations=300, subset=256, all_from=0.99)"
+COMPUTED = "computed(time_budget=120)"
+# Neural maps under one budget, that of `COMPUTED`: seconds of training, points of a step.
+EQUAL = "points=4096, subset=256, time_budget=120"
+
+HYBRID = "parapoint+slim(time_budget=120)"
+LEARNED_SEAM = "parapoint+slim(time_budget=120, price=None)"
+
+# What a user with a scan would do instead: every reconstruction with every flattening.
+MESHED_METHODS = tuple(
+    f"meshed(reconstruction={reconstruction}, flattening={flattening})"
+    for reconstruction in ("poisson", "ball_pivoting")
+    for flattening in ("xatlas", "lscm", "slim")
+)
+SAMPLED_MODELS = ("camelhead", "bunny_i_f10000", "cowhead_bff", "fairing-cross")
+SAMPLINGS = ("noise=0", "noise=0.005", "noise=0.01", "uneven")
+
+PAPER_CASES = (
+    "beetle_igl",
+    "mannequin-devil",
+    "keenan-ogre",
+    "hand_1_i_f5000",
+    "max_planck_i_f8000",
+    "nefertiti-lowres_odedstein",
+)
+QUALITY_CASES = (
+    "beetle_igl",
+    "hand_1_i_f5000",
+    "max_planck_i_f8000",
+    "camelhead",
+    "keenan-ogre",
+    "mannequin-devil",
+    "nefertiti-lowres_odedstein",
+    "fertility",
+    "rocker-arm",
+    "fandisk",
+)
+
+
+def reduced(option: str) -> str:
+    """The paper's preset at the reduced budget with one option changed."""
+    return f"parapoint(preset=paper, {REDUCED}, {option})"
+
+
+def members(*sets: str) -> tuple[str, ...]:
+    """Names of the models in these sets of the registry."""
+    return tuple(model.name for model in registry().values() if model.set in sets)
+
+
+WELL_BEHAVED = members("disk", "closed", "genus", "cad", "artist")
+
+SUITES: dict[str, Suite] = {
+    suite.name: suite
+    for suite in [
+        Suite(
+            "smoke",
+            "Smoke run: two models, small budgets",
+            ("hand_1_i_f5000", "cylinder_cgal"),
+            ("tutte", "lscm", "slim(energy=symmetric_dirichlet, iterations=5)", PAPER_SHORT),
+        ),
+        Suite(
+            "builtin",
+            "Surfaces made in memory, with known answers",
+            tuple(BUILTIN),
+            (*MESH_METHODS, PAPER_SHORT),
+        ),
+        Suite(
+            "paper",
+            "The supplement's comparison: five disks and nefertiti",
+            PAPER_CASES,
+            (
+                "tutte",
+                "lscm",
+                ISOMETRIC,
+                ONE_ITERATION,
+                CONFORMAL,
+                "xatlas",
+                PAPER_REDUCED,
+                COMPUTED,
+            ),
+        ),
+        Suite("disk", "Disks", members("disk"), (*MESH_METHODS, COMPUTED)),
+        Suite("closed", "Closed surfaces of genus 0", members("closed"), (*MESH_METHODS, COMPUTED)),
+        Suite("genus", "Closed surfaces with handles", members("genus"), (*MESH_METHODS, COMPUTED)),
+        Suite("cad", "CAD parts", members("cad"), (*MESH_METHODS, COMPUTED)),
+        Suite("artist", "Models with a UV map of their own", members("artist"), MESH_METHODS),
+        Suite("wild", "Defective meshes", members("wild"), (*MESH_METHODS, COMPUTED)),
+        Suite(
+            "scans",
+            "Point clouds and noisy scans",
+            members("scans"),
+            (*MESH_METHODS, *MESHED_METHODS, COMPUTED, PAPER_REDUCED),
+        ),
+        Suite(
+            "noise",
+            "Clouds sampled from disks: noise in fractions of the diagonal, uneven density",
+            tuple(f"{model}@{how}" for model in SAMPLED_MODELS for how in SAMPLINGS),
+            (*MESHED_METHODS, COMPUTED, PAPER_REDUCED),
+        ),
+        Suite(
+            "cuts",
+            "SLIM along automatic, learned and artists' seams",
+            members("artist", "closed", "genus"),
+            (ISOMETRIC, "automatic+slim", LEARNED_SEAM, HYBRID, "artist+slim"),
+        ),
+        Suite(
+            "core",
+            "All well-behaved models",
+            tuple(dict.fromkeys([*PAPER_CASES, *WELL_BEHAVED])),
+            (*MESH_METHODS, COMPUTED),
+        ),
+        Suite(
+            "neural",
+            "Neural maps with 120 s each",
+            (*PAPER_CASES, "camelhead"),
+            (
+                f"parapoint(preset=paper, {EQUAL}, all_from=1.0)",
+                COMPUTED,
+                f"fam({EQUAL})",
+                f"nuvo({EQUAL})",
+            ),
+        ),
+        Suite(
+            "ablation",
+            "The paper's ablation: distortion terms and branches",
+            ("cube_odedstein", "cylinder_cgal", "eight_cfwen"),
+            (
+                PAPER_REDUCED,
+                reduced("distortion=isometric"),
+                reduced("branches='2d'"),
+                reduced("branches='3d'"),
+                reduced("distortion_weight=1e-4"),
+            ),
+        ),
+        Suite(
+            "quality",
+            "The computed map on ten models, three seeds",
+            QUALITY_CASES,
+            ("lscm", ISOMETRIC, CONFORMAL, COMPUTED),
+            (0, 1, 2),
+        ),
+    ]
+}
+"""All suites by name."""
+
+
+def suite(name: str) -> Suite:
+    """The suite of this name.
+
+    Raises:
+        InputError: there is none; the message names all.
+    """
+    if name not in SUITES:
+        near = difflib.get_close_matches(name, SUITES, n=1)
+        hint = f"perhaps {near[0]}; " if near else ""
+        raise InputError(f"there is no suite {name!r}; {hint}there are {', '.join(SUITES)}")
+    return SUITES[name]

@@ -1,0 +1,1 @@
+"""Long checks of the benchmark itself: golden values, endurance, fuzzing."""

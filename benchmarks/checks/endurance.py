@@ -1,0 +1,304 @@
+"""`python -m benchmarks.checks.endurance`: what a run survives, and what the harness costs.
+
+`kills`: a run is killed (kill -9) a thousand times at random instants and taken up again. No row
+that had been reported done is lost, none is damaged, and each table that comes of it is the one of
+a run that was never disturbed.
+
+`faults`: methods that crash, hang, fork, print and eat memory, among instant ones. Each costs its
+own cell: a row with its reason; the others have the maps of a run in which nothing went wrong.
+
+`scale`: runs of an instant method. What the harness costs a cell, whether that grows with the
+number of cells, how large the store becomes, how long a finished run takes to say so.
+
+`overhead`: cells of every method. What each takes beside the seconds of the method.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import random
+import shutil
+import signal
+import statistics
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+import psutil
+
+from baselines import registry
+from benchmarks.cases.suites import Suite
+from benchmarks.checks import faulty, instant
+from benchmarks.running import runner
+from benchmarks.store.results import Store
+from parapoint import console
+from parapoint.testing import irregular_disk
+
+PLUGIN = f"{instant.__file__}:Instant"
+TIMING = ("seconds", "cpu_seconds", "peak_memory_mb", "run")
+"""What differs between two rows of the same cell."""
+CASES = ("half_cylinder", "saddle@noise=0")
+"""A mesh and a cloud, for methods of either."""
+BUDGETS = {
+    **dict.fromkeys(("parapoint", "fam", "nuvo"), "points=120, subset=100, iterations=2"),
+    "parapoint+slim": "points=120, iterations=2",
+}
+"""Parameters of the methods that would take minutes."""
+
+
+def instant_suite(folder: Path, models: int, methods: int, seeds: int) -> Suite:
+    """A suite of instant methods on small meshes, which are written into `folder`."""
+    mesh = irregular_disk()
+    cases = []
+    folder.mkdir(parents=True, exist_ok=True)
+    for n in range(models):
+        path = folder / f"mesh{n}.off"
+        with path.open("w") as stream:
+            stream.write(f"OFF\n{len(mesh.vertices)} {len(mesh.faces)} 0\n")
+            np.savetxt(stream, mesh.vertices * (1 + n / 100))
+            np.savetxt(stream, np.insert(mesh.faces, 0, 3, axis=1), fmt="%d")
+        cases.append(str(path))
+    specs = tuple(f"instant(variant={n})" for n in range(methods))
+    return Suite("endurance", "Instant methods", tuple(cases), specs, tuple(range(seeds)))
+
+
+@dataclass
+class Toll:
+    """What came of the kills.
+
+    Attributes:
+        kills: how often a run was killed.
+        tables: runs that came to their end, all of whose kills were survived.
+        reported: rows that were reported done before a kill.
+        faults: what was lost, damaged or different: one line each.
+    """
+
+    kills: int = 0
+    tables: int = 0
+    reported: int = 0
+    faults: int = 0
+
+    def fault(self, text: str) -> None:
+        """Count and say a fault."""
+        self.faults += 1
+        print(text, flush=True)
+
+
+def toll(suite: Suite, folder: Path, *, count: int, seed: int) -> Toll:
+    """Kill runs of `suite` at `count` instants, anywhere within the time that a whole run takes.
+
+    Every time it comes to its end its table is compared with that of a run that was left alone,
+    and it begins anew in another folder.
+    """
+    draw = random.Random(seed)  # noqa: S311  no secret
+    found = Toll()
+    whole = runner.run(suite, folder / "undisturbed", plugins=[PLUGIN]).seconds
+    expected = _table(Store(folder / "undisturbed"))
+    while found.kills < count:
+        out = folder / f"run{found.tables}"
+        reported: set[str] = set()
+        while found.kills < count and _killed(suite, out, draw.uniform(0, whole), reported):
+            found.kills += 1
+            _check(Store(out), reported, found)
+        runner.run(suite, out, plugins=[PLUGIN])
+        found.reported += len(reported)
+        found.tables += 1
+        for fault in Store(out).faults():
+            found.fault(f"{out.name}: {fault}")
+        if _table(Store(out)) != expected:
+            found.fault(f"{out.name}: another table than that of the undisturbed run")
+        print(found, flush=True)
+        shutil.rmtree(out)
+    return found
+
+
+class _Report(runner.Progress):
+    """Reports each row as it is done, through a pipe: what went in is there after a kill."""
+
+    def __init__(self, pipe: int) -> None:
+        self.pipe = pipe
+
+    def ended(self, cell: runner.Cell, row: Any) -> None:  # noqa: ARG002  as its base
+        """Send the row's id, in one write."""
+        os.write(self.pipe, f"{row.id}\n".encode())
+
+
+def _killed(suite: Suite, out: Path, delay: float, reported: set[str]) -> bool:
+    """Run `suite` in a process that is killed after `delay` s; False where it had ended by then.
+
+    The process is a fork of this one, which has the imports behind it: kills go into the run.
+    Ids of rows that it reports are added to `reported`.
+    """
+    receive, send = os.pipe()
+    child = os.fork()
+    if not child:
+        try:
+            os.close(receive)
+            runner.run(suite, out, plugins=[PLUGIN], progress=_Report(send))
+            os._exit(0)
+        finally:
+            os._exit(1)
+    os.close(send)
+    time.sleep(delay)
+    os.kill(child, signal.SIGKILL)
+    _, status = os.waitpid(child, 0)
+    with os.fdopen(receive) as stream:
+        reported |= set(stream.read().split())
+    if os.WIFEXITED(status) and os.WEXITSTATUS(status):
+        raise RuntimeError(f"a run in {out} ended by itself with an error")
+    return os.WIFSIGNALED(status)
+
+
+def _check(store: Store, reported: set[str], found: Toll) -> None:
+    """All that was reported is there and whole; no more than the last line is torn."""
+    missing = reported - {row.id for row in store.history()}
+    if missing:
+        found.fault(f"{store.folder.name}: {len(missing)} rows that were reported are gone")
+    for fault in store.faults():
+        found.fault(f"{store.folder.name}: {fault}")
+
+
+def _table(store: Store) -> list[dict[str, Any]]:
+    """Rows and metrics of a run, by cell, without what takes time."""
+    frame = store.metrics().set_index("id").drop(columns="metrics_key")
+    metrics = {str(key): repr(value) for key, value in frame.to_dict("index").items()}
+    rows = sorted(store.rows(), key=lambda row: row.cell)
+    return [
+        {key: value for key, value in vars(row).items() if key not in TIMING}
+        | {"metrics": metrics[row.id]}
+        for row in rows
+    ]
+
+
+def saved(models: Path, out: Path, seeds: int) -> Toll:
+    """Run methods that go wrong among instant ones: each costs its own cell, and nothing else."""
+    instants = instant_suite(models, models=2, methods=2, seeds=seeds)
+    wrong = tuple(f"faulty(fault={fault})" for fault in faulty.FAULTS)
+    mixed = dataclasses.replace(instants, methods=(*wrong, *instants.methods))
+    found = Toll()
+    runner.run(instants, out / "alone", plugins=[PLUGIN])
+    plugins = [PLUGIN, f"{faulty.__file__}:Faulty"]
+    runner.run(mixed, out / "mixed", plugins=plugins, jobs=2, timeout=2.0, memory=0.5)
+    store = Store(out / "mixed")
+    for fault in store.faults():
+        found.fault(fault)
+    rows = store.rows()
+    for row in rows:
+        if row.method == "faulty":
+            expected = faulty.FAULTS[str(row.params["fault"])][1]
+            if row.status != expected or not row.reason:
+                found.fault(f"{row.cell}: {row.status} ({row.reason}) in place of {expected}")
+    well = {row.cell: row.uv_sha256 for row in rows if row.method == "instant"}
+    if well != {row.cell: row.uv_sha256 for row in Store(out / "alone").rows()}:
+        found.fault("other maps than those of a run in which nothing went wrong")
+    found.reported = len(rows)
+    for process in psutil.process_iter(["cwd"]):  # by where it is: its parent may be gone
+        if (process.info["cwd"] or "").startswith(str(out.resolve())):
+            found.fault(f"process {process.pid} is left")
+    return found
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+def main() -> None:
+    """Kill runs, and measure what the harness costs."""
+
+
+@main.command()
+@click.option("--count", type=click.IntRange(1), default=1000, show_default=True)
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.pass_context
+def kills(ctx: click.Context, count: int, seed: int) -> None:
+    """Kill a run at random instants, and count what is lost."""
+    with tempfile.TemporaryDirectory() as name:
+        suite = instant_suite(Path(name) / "models", models=4, methods=2, seeds=4)
+        began = time.monotonic()
+        found = toll(suite, Path(name), count=count, seed=seed)
+    print(
+        f"{found.kills} kills in {time.monotonic() - began:.0f} s, {found.reported} rows had been "
+        f"reported, {found.tables} runs came to their end: {found.faults or 'no'} faults"
+    )
+    if found.faults:
+        ctx.exit(1)
+
+
+@main.command()
+@click.option("--seeds", type=click.IntRange(1), default=20, show_default=True)
+@click.pass_context
+def faults(ctx: click.Context, seeds: int) -> None:
+    """Let methods crash, hang, fork and eat memory, and see what that costs the others."""
+    with tempfile.TemporaryDirectory() as name:
+        found = saved(Path(name) / "models", Path(name), seeds)
+    print(f"{found.reported} cells: {found.faults or 'no'} faults")
+    if found.faults:
+        ctx.exit(1)
+
+
+@main.command()
+@click.option("--models", type=click.IntRange(1), default=1000, show_default=True)
+@click.option("--methods", type=click.IntRange(1), default=12, show_default=True)
+@click.option("--seeds", type=click.IntRange(1), default=3, show_default=True)
+@click.option("--jobs", type=click.IntRange(1), default=2, show_default=True)
+@click.option("--out", type=click.Path(path_type=Path), default=Path("results/scale"))
+def scale(models: int, methods: int, seeds: int, jobs: int, out: Path) -> None:
+    """Run instant methods, and say what the harness costs; a run that was stopped goes on."""
+    suite = instant_suite(out / "models", models, methods, seeds)
+    store = out / "store"
+    for title in ("run", "run again"):
+        began, used = time.monotonic(), _processor_seconds()
+        summary = runner.run(suite, store, plugins=[PLUGIN], jobs=jobs)
+        seconds, used = time.monotonic() - began, _processor_seconds() - used
+        print(
+            f"{title}: {len(summary.ran)} cells after {len(summary.kept)}: {seconds:.1f} s, "
+            f"{used:.1f} s of processor time"
+        )
+        if summary.ran:
+            print(f"  a cell: {seconds / len(summary.ran):.4f} s, {used / len(summary.ran):.4f} s")
+    cells = len(summary.kept)
+    size = sum(path.stat().st_size for path in store.rglob("*") if path.is_file())
+    print(f"store: {size / 1e6:.1f} MB, {size / cells:.0f} bytes a cell")
+
+
+@main.command()
+@click.option("--cells", type=click.IntRange(1), default=5, show_default=True)
+def overhead(cells: int) -> None:
+    """Run CELLS cells of every method on a mesh and on a cloud: what the harness adds to each."""
+    clock = _Clock()
+    specs = [f"{name}({BUDGETS.get(name, '')})" for name in registry.METHODS if name != "external"]
+    suite = Suite("overhead", "Small cells of every method", CASES, (*specs,), (*range(cells),))
+    with tempfile.TemporaryDirectory() as name:
+        runner.run(suite, name, progress=clock)
+    for method, seconds in sorted(clock.added.items()):
+        median, longest = statistics.median(seconds), max(seconds)
+        print(f"{method:16} {len(seconds):3} cells  {median:.3f} s, at most {longest:.3f} s")
+
+
+class _Clock(runner.Progress):
+    """Seconds that each cell that is ok took beside its method, by method."""
+
+    def __init__(self) -> None:
+        self.began = 0.0
+        self.added: dict[str, list[float]] = {}
+
+    def started(self, cell: runner.Cell) -> None:  # noqa: ARG002  as its base
+        """Start the clock."""
+        self.began = time.monotonic()
+
+    def ended(self, cell: runner.Cell, row: Any) -> None:  # noqa: ARG002  as its base
+        """Note the time since, but for that of the method."""
+        if row.status == "ok":
+            added = time.monotonic() - self.began - row.seconds
+            self.added.setdefault(row.method, []).append(added)
+
+
+def _processor_seconds() -> float:
+    """Processor time of this process and of those that it has waited for."""
+    return sum(os.times()[:4])
+
+
+if __name__ == "__main__":
+    console.run(main)

@@ -1,0 +1,278 @@
+"""`python -m benchmarks.checks.fuzzing TARGET`: bytes that no program wrote, into every reader.
+
+A target takes bytes as a file's content. It may return or raise InputError; anything else, a
+second of time or a hundred megabytes for a few kilobytes of input is a finding. atheris (libFuzzer)
+changes the seeds guided by the branches of the Python code that they reach, and keeps what made a
+finding; the tests do a short, unguided form of the same.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import io
+import logging
+import resource
+import struct
+import sys
+import tempfile
+import time
+import types
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from parapoint import console
+from parapoint.errors import InputError
+from parapoint.files.surfaces import FORMATS, UV_FORMATS
+
+LONGEST = 4096
+"""Bytes of an input, at most."""
+SECONDS = 5.0
+"""Processor time that one input may take: far more than it needs, so that it is no noise."""
+MEGABYTES = 300
+"""By how much one process may grow, whatever it is fed."""
+TABLES = ("runs.jsonl", "environment.json", "surfaces.json", "metrics.parquet")
+STORE_FILES = (*TABLES, "uv", "surface")
+"""Parts of a results folder; the first byte of an input to `store` says which it replaces."""
+
+
+class Finding(Exception):  # noqa: N818  not an error of this program
+    """An input was too slow, or took too much memory."""
+
+
+def read_as(ending: str, data: bytes) -> None:
+    """Read `data` as a file of that ending: its surface, and its map where it may carry one."""
+    from parapoint.files.surfaces import read_parameterized, read_surface
+
+    path = _scratch() / f"input{ending}"
+    path.write_bytes(data)
+    with contextlib.suppress(InputError):
+        read_surface(path)
+    if ending in UV_FORMATS:
+        with contextlib.suppress(InputError):
+            read_parameterized(path)
+
+
+def score(data: bytes) -> None:
+    """Score `data` as an OBJ file, or as an NPZ file where it is an archive."""
+    from benchmarks.commands.score import map_state, read_point_map
+    from benchmarks.metrics import table as metrics
+
+    path = _scratch() / ("map.npz" if data.startswith(b"PK") else "map.obj")
+    path.write_bytes(data)
+    with contextlib.suppress(InputError):
+        if path.suffix == ".npz":
+            metrics.evaluate_points(*read_point_map(path))
+        else:
+            metrics.values(map_state(path))
+
+
+def store(data: bytes) -> None:
+    """Read and check a results folder one file of which is `data` but for its first byte."""
+    from benchmarks.store.results import Store
+
+    folder, row_id, surface_hash = _results()
+    name = STORE_FILES[data[0] % len(STORE_FILES)] if data else STORE_FILES[0]
+    places = {"uv": f"uv/{row_id}.npz", "surface": f"surfaces/{surface_hash}.npz"}
+    path = folder / places.get(name, name)
+    before = path.read_bytes()
+    path.write_bytes(data[1:])
+    try:
+        with contextlib.suppress(InputError):
+            results = Store(folder)
+            list(results.faults())
+            results.surface_hashes()
+            results.metrics()
+            with results.writing():
+                results.rows()
+    finally:
+        path.write_bytes(before)
+        if name != "runs.jsonl":  # what was torn of it has been set aside
+            (folder / "runs.torn").unlink(missing_ok=True)
+
+
+TARGETS: dict[str, Callable[[bytes], None]] = {
+    **{ending[1:]: functools.partial(read_as, ending) for ending in FORMATS},
+    "score": score,
+    "store": store,
+}
+"""What takes bytes, by name: a reader for each ending, `score` and the results folder."""
+
+
+def guarded(target: Callable[[bytes], None], data: bytes) -> None:
+    """Give `data` to `target`.
+
+    Raises:
+        Finding: it took too long, or the process has become too large.
+        Exception: whatever the target raises.
+    """
+    began = time.process_time()
+    target(data)
+    seconds = time.process_time() - began
+    if seconds > SECONDS:
+        raise Finding(f"{seconds:.1f} s for {len(data)} bytes")
+    grown = _peak_megabytes() - _first_megabytes()
+    if grown > MEGABYTES:
+        raise Finding(f"{grown:.0f} MB more than at the start, after {len(data)} bytes")
+
+
+def _peak_megabytes() -> float:
+    """Peak resident memory of this process."""
+    unit = 1 if sys.platform == "darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6
+
+
+@functools.cache
+def _first_megabytes() -> float:
+    """Peak resident memory before the first input was done, its imports included."""
+    return _peak_megabytes()
+
+
+@functools.cache
+def _scratch() -> Path:
+    """A folder for the files of this process, in memory where the system has such a place."""
+    shared = Path("/dev/shm")  # noqa: S108  the folder made in it is private
+    folder = tempfile.TemporaryDirectory(dir=shared if shared.is_dir() else None)
+    _kept.append(folder)
+    return Path(folder.name)
+
+
+_kept: list[tempfile.TemporaryDirectory[str]] = []
+"""Folders that go with the process."""
+
+
+@functools.cache
+def _results() -> tuple[Path, str, str]:
+    """A results folder with one cell; the ids of its row and of its surface."""
+    from benchmarks.cases.suites import Suite
+    from benchmarks.checks import instant
+    from benchmarks.running import runner
+    from benchmarks.store.results import Store
+
+    folder = _scratch() / "results"
+    mesh = _scratch() / "mesh.off"
+    mesh.write_bytes(seeds("off")[0])
+    suite = Suite("fuzz", "A folder to damage", (str(mesh),), (), (0,))
+    runner.run(suite, folder, plugins=[f"{instant.__file__}:Instant"])
+    (row,) = Store(folder).rows()
+    return folder, row.id, row.surface_hash
+
+
+def _functions(*packages: str) -> Iterator[types.FunctionType]:
+    """The functions and methods of these packages' modules, as far as they are imported."""
+    for name, module in list(sys.modules.items()):
+        if any(f"{name}.".startswith(f"{package}.") for package in packages):
+            for value in list(vars(module).values()):
+                members = vars(value).values() if isinstance(value, type) else [value]
+                for member in members:
+                    if isinstance(member, types.FunctionType) and member.__module__ == name:
+                        yield member
+
+
+def seeds(target: str) -> list[bytes]:
+    """Small inputs that are right, from which the fuzzer starts."""
+    if target == "store":
+        folder, row_id, surface_hash = _results()
+        names = [*TABLES, f"uv/{row_id}.npz", f"surfaces/{surface_hash}.npz"]
+        return [bytes([n]) + (folder / name).read_bytes() for n, name in enumerate(names)]
+    return _file_seeds()[target]
+
+
+def _file_seeds() -> dict[str, list[bytes]]:
+    """A square in two triangles, as every format that has a seed of its own."""
+    import laspy
+    import trimesh
+
+    export: Any = trimesh.exchange.gltf.export_gltf  # untyped, as the next
+    textured: Any = trimesh.visual.TextureVisuals
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0.5], [0, 1, 0]], dtype=float)
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    mesh = trimesh.Trimesh(points, faces, visual=textured(uv=points[:, :2]), process=False)
+    plain = trimesh.Trimesh(points, faces, process=False)
+    rows = "\n".join(f"{x} {y} {z}" for x, y, z in points)
+    header = "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 4\nHEIGHT 1\n"
+    header += "VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 4\nDATA "
+    floats = points.astype("<f4").tobytes()
+    columns = points.T.astype("<f4").tobytes()
+    packed = b"".join(bytes([15]) + columns[k : k + 16] for k in range(0, 48, 16))
+    las = laspy.create(point_format=0, file_version="1.2")
+    las.xyz = points
+    stream = io.BytesIO()
+    las.write(stream)
+    obj = "".join(f"v {x} {y} {z}\nvt {x} {y}\n" for x, y, z in points)
+    obj += "f 1/1 2/2 3/3\nf -4/-4 -2/-2 -1/-1 # seen from the end\n"
+    strips = "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+    ply = "ply\nformat ascii 1.0\nelement vertex 4\n"
+    ply += "".join(f"property float {name}\n" for name in "xyz") + strips + rows + "\n4 0 1 2 3\n"
+    off = f"OFF\n4 1 0\n{rows}\n4 0 1 2 3\n"
+    counts = np.array([4, 1, 0], ">i4").tobytes(), np.array([4, 0, 1, 2, 3, 0], ">i4").tobytes()
+    binary_off = b"OFF BINARY\n" + counts[0] + points.astype(">f4").tobytes() + counts[1]
+    archive = io.BytesIO()
+    np.savez(archive, points=points, uv=points[:, :2])
+    tree = export(trimesh.Scene(mesh), embed_buffers=True)
+    return {
+        "obj": [obj.encode()],
+        "ply": [ply.encode(), _exported(plain, "ply")],
+        "off": [off.encode(), binary_off],
+        "stl": [_exported(plain, "stl"), _exported(plain, "stl_ascii")],
+        "glb": [_exported(mesh, "glb")],
+        "gltf": [tree["model.gltf"]],
+        "xyz": [rows.encode(), rows.replace(" ", ",").encode()],
+        "pts": [f"4\n{rows}\n".encode()],
+        "pcd": [
+            f"{header}ascii\n{rows}\n".encode(),
+            f"{header}binary\n".encode() + floats,
+            f"{header}binary_compressed\n".encode() + struct.pack("<II", 51, 48) + packed,
+        ],
+        "las": [stream.getvalue()],
+        "laz": [stream.getvalue()],
+        "score": [obj.encode(), archive.getvalue()],
+    }
+
+
+def _exported(mesh: Any, kind: str) -> bytes:
+    """A file of a trimesh mesh."""
+    content = mesh.export(file_type=kind)
+    return content.encode() if isinstance(content, str) else bytes(content)
+
+
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.argument("target", type=click.Choice(list(TARGETS)))
+@click.option("--runs", type=click.IntRange(1), default=100_000, show_default=True)
+@click.option("--seconds", type=click.IntRange(1), help="End after so long.  [default: never]")
+@click.option("--seed", type=click.IntRange(1), default=1, show_default=True)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("results/fuzz"),
+    show_default=True,
+    help="Keeps what inputs were worth keeping, and findings.",
+)
+def main(target: str, *, runs: int, seconds: int | None, seed: int, out: Path) -> None:
+    """Feed a TARGET with RUNS inputs; ends with an error at the first finding."""
+    try:
+        import atheris
+    except ImportError:
+        raise InputError(
+            "needs the package atheris: python -m pip install -e '.[fuzz]' (Linux)"
+        ) from None
+    logging.disable(logging.CRITICAL)
+    corpus = out / target
+    corpus.mkdir(parents=True, exist_ok=True)
+    for n, data in enumerate(seeds(target)):
+        (corpus / f"seed{n}").write_bytes(data)
+    for function in _functions("parapoint", "benchmarks", "trimesh.exchange.stl", "laspy"):
+        atheris.instrument_func(function)
+    run = functools.partial(guarded, TARGETS[target])
+    arguments = [f"-runs={runs}", f"-seed={seed}", f"-max_len={LONGEST}", "-timeout=60"]
+    arguments.append(f"-max_total_time={seconds or 0}")
+    atheris.Setup([sys.argv[0], *arguments, f"-artifact_prefix={out}/{target}-", str(corpus)], run)
+    atheris.Fuzz()
+
+
+if __name__ == "__main__":
+    console.run(main)

@@ -1,0 +1,90 @@
+"""What `python -m benchmarks list` shows: suites, cases, methods, metrics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rich.table import Table
+from rich.text import Text
+
+from parapoint.errors import InputError
+
+
+def _table(*columns: str) -> Table:
+    """An empty table."""
+    table = Table()
+    for column in columns:
+        table.add_column(column)
+    return table
+
+
+def _add(table: Table, *texts: str) -> None:
+    """Add a row of plain texts, in which brackets are no markup."""
+    table.add_row(*map(Text, texts))
+
+
+def suites() -> Table:
+    """Each suite with its cases and methods."""
+    from benchmarks.cases.suites import SUITES
+
+    table = _table("suite", "title", "cases", "methods", "seeds")
+    for suite in SUITES.values():
+        _add(
+            table,
+            suite.name,
+            suite.title,
+            ", ".join(suite.cases),
+            ", ".join(suite.methods),
+            ", ".join(map(str, suite.seeds)),
+        )
+    return table
+
+
+def cases() -> Table:
+    """Each model with its topology and licence."""
+    from benchmarks.cases import models
+
+    table = _table("case", "topology", "claim", "licence")
+    for name in models.names():
+        model = models.info(name)
+        if model is None:
+            _add(table, name, "", "made in memory", "")
+        else:
+            _add(table, name, model.topology, model.claim or "", model.licence)
+    return table
+
+
+def methods() -> Table:
+    """Each method with what it requires and its parameters."""
+    from baselines import registry
+
+    table = _table("method", "requires", "deterministic", "parameters", "summary")
+    for name in registry.names():
+        try:
+            about = registry.describe(name)
+        except (ImportError, InputError) as error:
+            _add(table, name, "", "", "", f"cannot be imported: {error}")
+            continue
+        parameters = ", ".join(f"{key}={value}" for key, value in about.parameters.items())
+        requires = ", ".join(about.requires)
+        _add(table, name, requires, about.deterministic, parameters, about.summary)
+    return table
+
+
+def metrics() -> Table:
+    """Each metric with its unit, direction and source."""
+    from benchmarks.metrics.table import METRICS
+
+    table = _table("metric", "label", "unit", "better", "ideal", "weighting", "source")
+    for name, metric in METRICS.items():
+        facts = (metric.label, metric.unit, metric.better, metric.ideal, metric.weighting)
+        _add(table, name, *(str(fact) for fact in facts), metric.source)
+    return table
+
+
+LISTS: dict[str, Callable[[], Table]] = {
+    "suites": suites,
+    "cases": cases,
+    "methods": methods,
+    "metrics": metrics,
+}

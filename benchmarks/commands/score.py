@@ -1,0 +1,214 @@
+"""`python -m benchmarks score`: every metric of an existing map, from whatever tool it comes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+import numpy as np
+from rich import box
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from benchmarks.metrics import table as metrics
+from benchmarks.metrics.table import GROUPS, METRICS, WITHOUT_SPANNING, MapState
+from parapoint.errors import InputError
+from parapoint.files.surfaces import faults_of, read_parameterized
+from parapoint.surfaces.parameterization import Parameterization, PointParameterization
+from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, PointCloud
+
+WORST = 5
+"""Faces listed as the worst, by angle and by area."""
+SAME_PLACE = 1e-5
+"""A reference's corners may lie this far away, over the surface's extent (as Shay et al. allow)."""
+WIDTH = 160
+"""Columns of the tables where the output is no terminal."""
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option(
+    "--reference", type=click.Path(path_type=Path), help="Another map of the same faces: its UV."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object {metric: value}.")
+@click.option(
+    "--heatmap", type=click.Path(path_type=Path), metavar="OUT.png", help="Draw the distortion."
+)
+def score(file: Path, *, reference: Path | None, as_json: bool, heatmap: Path | None) -> None:
+    """Every metric of the UV map in FILE: OBJ with vt, GLB, or a point cloud's NPZ (points, uv).
+
+    Polygons are triangulated first; faces are the triangles, numbered from 0 in the file's order.
+    JSON has no infinity: an infinite value is the string "inf".
+    """
+    if file.suffix.lower() == ".npz":
+        if reference is not None or heatmap is not None:
+            raise InputError(f"{file}: --reference and --heatmap need a mesh, not a point cloud")
+        cloud, image = read_point_map(file)
+        with faults_of(file):
+            values = metrics.evaluate_points(cloud, image)
+        title = f"{file}: {len(cloud.points):,} points"
+        state = None
+    else:
+        state = map_state(file, reference)
+        values = metrics.values(state)
+        title = f"{file}: {summary(state)}"
+        if heatmap is not None:
+            from benchmarks.commands.heatmap import write_heatmap
+
+            write_heatmap(state, heatmap, title=file.name)
+    if as_json:
+        print(json.dumps(json_values(values), allow_nan=False))
+        return
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=WIDTH)
+    console.print(Text(title, style="bold"))
+    for table in tables(values):
+        console.print(table)
+    if state is not None:
+        console.print(worst_table(state))
+
+
+def map_state(file: Path, reference: Path | None = None) -> MapState:
+    """The map in a file, and the reference of another one.
+
+    Raises:
+        InputError: a file cannot be read; the map has no UV area; the reference has other faces.
+    """
+    mesh, parameterization = read_parameterized(file)
+    state = MapState(mesh, parameterization)
+    with faults_of(file):
+        if not (np.abs(state.triangles.uv_area) > 0).any():
+            raise InputError("every face has zero UV area; there is no map to score")
+    if reference is None:
+        return state
+    other_mesh, other = read_parameterized(reference)
+    if not same_faces(mesh, other_mesh):
+        raise InputError(
+            f"{reference}: has other faces than {file} ({len(other_mesh.faces)} and "
+            f"{len(mesh.faces)}); a reference is another map of the same mesh, in the same order"
+        )
+    return MapState(mesh, parameterization, Parameterization(other.uv, other.corners))
+
+
+def same_faces(mesh: Mesh, other: Mesh) -> bool:
+    """Whether two meshes have the same triangles in the same order, up to rounding."""
+    if len(mesh.faces) != len(other.faces):
+        return False
+    here, there = mesh.vertices[mesh.faces], other.vertices[other.faces]
+    extent = float(np.ptp(here.reshape(-1, 3), axis=0).max())
+    return bool((np.abs(here - there) <= SAME_PLACE * extent).all())
+
+
+def read_point_map(file: Path) -> tuple[PointCloud, PointParameterization]:
+    """The points and their images in an .npz file with arrays `points` and `uv`.
+
+    Raises:
+        InputError: the file cannot be read, lacks an array, or an array is not as said.
+    """
+    with faults_of(file):
+        if not file.is_file():
+            raise InputError("no such file")
+        with np.load(file) as arrays:
+            missing = [name for name in ("points", "uv") if name not in arrays]
+            if missing:
+                raise InputError(f"has no array {missing[0]!r}; a point map has points and uv")
+            return PointCloud(arrays["points"]), PointParameterization(arrays["uv"])
+
+
+def json_values(values: dict[str, float]) -> dict[str, float | str]:
+    """The values as strict JSON takes them: infinity as "inf"."""
+    return {name: value if np.isfinite(value) else str(value) for name, value in values.items()}
+
+
+def summary(state: MapState) -> str:
+    """The map in a few words."""
+    distortion = state.distortion
+    middle = float(np.median(distortion.quasi_conformal)) if len(distortion.faces) else np.inf
+    faces, topology = len(state.mesh.faces), state.mesh.topology
+    return f"{faces:,} faces, surface: {topology}; median σ1/σ2 {middle:.4g}"
+
+
+def tables(values: dict[str, float]) -> list[Table]:
+    """One table a group, with a column for values without spanning faces where there are any."""
+    spans = values.get("spanning_fraction", values.get("spanning_point_fraction", 0.0)) > 0
+    found = []
+    for group, title in GROUPS.items():
+        rows = [
+            metric
+            for name, metric in METRICS.items()
+            if metric.group == group and name in values and not name.endswith(WITHOUT_SPANNING)
+        ]
+        if not rows:
+            continue
+        twice = spans and any(row.name + WITHOUT_SPANNING in values for row in rows)
+        table = _titled(f"{group}: {title}")
+        table.add_column("metric", no_wrap=True)
+        for heading in ("value", *["without spanning"] * twice, "ideal"):
+            table.add_column(heading, justify="right", no_wrap=True)
+        for heading in ("better", "what it is", "weighting"):
+            table.add_column(heading)
+        for row in rows:
+            cells = [row.name, number(values[row.name])]
+            if twice:
+                without = values.get(row.name + WITHOUT_SPANNING)
+                cells.append("" if without is None else number(without))
+            cells.append("" if row.ideal is None else f"{row.ideal:g}")
+            table.add_row(*map(Text, [*cells, row.better, row.heading, row.weighting]))
+        found.append(table)
+    return found
+
+
+def _titled(title: str) -> Table:
+    return Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD)
+
+
+def number(value: float) -> str:
+    """A value to five digits; a whole one in full."""
+    return f"{value:.0f}" if abs(value) < 1e15 and value == round(value) else f"{value:.5g}"
+
+
+def worst_faces(state: MapState) -> tuple[IntArray, IntArray]:
+    """The faces worst in angle and worst in area, worst first (up to WORST each)."""
+    distortion = state.distortion
+
+    def worst(values: FloatArray) -> IntArray:
+        return distortion.faces[np.argsort(-values, kind="stable")[:WORST]]
+
+    return worst(distortion.quasi_conformal), worst(distortion.area_log_ratio)
+
+
+def worst_table(state: MapState) -> Table:
+    """The worst faces with their distortion, chart, and what is wrong with them."""
+    distortion = state.distortion
+    row_of = np.full(len(state.mesh.faces), -1)
+    row_of[distortion.faces] = np.arange(len(distortion.faces))
+    table = _titled("worst faces, numbered from 0 in the file's order")
+    for heading in ("worst by", "face", "vertices", "chart", "σ1/σ2", "a/A"):
+        table.add_column(heading, justify="left" if heading == "worst by" else "right")
+    table.add_column("angle difference")
+    table.add_column("notes")
+    flags = {
+        "flipped": state.validity.flipped,
+        "degenerate in UV": state.triangles.degenerate_uv,
+        "overlaps": state.validity.overlaps.overlapped,
+        "spans a seam": state.spanning,
+    }
+    charts = state.parameterization.charts()
+    for reason, faces in zip(("angle", "area"), worst_faces(state), strict=True):
+        for face in faces:
+            row = row_of[face]
+            table.add_row(
+                reason,
+                str(face),
+                " ".join(map(str, state.mesh.faces[face])),
+                str(charts[face]),
+                number(float(distortion.quasi_conformal[row])),
+                number(float(distortion.area_ratio[row])),
+                number(float(distortion.angle_difference[row].max())),
+                ", ".join(name for name, mask in flags.items() if mask[face]),
+            )
+        table.add_section()
+    return table

@@ -1,0 +1,218 @@
+"""Metrics of a map of a point cloud, which need no mesh: a raw scan can be scored.
+
+Neighbours are the k = 8 nearest other points. A surface has no area here: every mean is over the
+points, each counting the same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from benchmarks.metrics.distortion import mean, power_of_two
+from benchmarks.metrics.seams import QUARTILE, SPANNING_LENGTH, SPANNING_STRETCH, square_side
+from parapoint.errors import InputError
+from parapoint.surfaces.parameterization import PointParameterization
+from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, PointCloud
+
+NEIGHBOURS = 8
+SEAM_NEIGHBOURS = 3
+"""K_cut of ParaPoint; T_cut is `SPANNING_LENGTH`."""
+RANKED_POINTS = 20_000
+"""Ranks are taken at this many points at most, evenly spread over the cloud's order."""
+
+
+@dataclass(frozen=True, eq=False)
+class PointMap:
+    """What the point-cloud metrics read; both sets of coordinates are scaled by powers of two.
+
+    Attributes:
+        points: (P, 3) points.
+        uv: (P, 2) their images.
+    """
+
+    points: FloatArray
+    uv: FloatArray
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """Search tree of the points."""
+        return cKDTree(self.points)
+
+    @cached_property
+    def uv_tree(self) -> cKDTree:
+        """Search tree of the images."""
+        return cKDTree(self.uv)
+
+    @property
+    def k(self) -> int:
+        """Number of neighbours: 8, or all other points of a smaller cloud."""
+        return min(NEIGHBOURS, len(self.points) - 1)
+
+    @cached_property
+    def neighbours(self) -> IntArray:
+        """(P, k) nearest other points, nearest first."""
+        return nearest_others(self.tree, self.k)
+
+    @cached_property
+    def uv_neighbours(self) -> IntArray:
+        """(P, k) other points with the nearest images, nearest first."""
+        return nearest_others(self.uv_tree, self.k)
+
+    @cached_property
+    def singular_values(self) -> FloatArray:
+        """(P, 2) singular values, larger first, of the least-squares J at each point.
+
+        J maps offsets within the tangent plane, spanned by the two main directions of the
+        neighbourhood, to UV offsets. (0, 0) where the neighbourhood spans no plane.
+        """
+        offsets = self.points[self.neighbours] - self.points[:, None]
+        images = self.uv[self.neighbours] - self.uv[:, None]
+        _, spread, axes = np.linalg.svd(offsets, full_matrices=False)
+        planar = spread[:, 1] > 1e-9 * np.maximum(spread[:, 0], np.finfo(np.float64).tiny)
+        local = offsets[planar] @ axes[planar, :2].transpose(0, 2, 1)
+        jacobian = np.linalg.pinv(local) @ images[planar]
+        values = np.zeros((len(self.points), 2))
+        values[planar] = np.linalg.svd(jacobian, compute_uv=False)
+        return values
+
+    @cached_property
+    def spanning(self) -> BoolArray:
+        """(P,) whether the map tears between a point and one of its neighbours.
+
+        The edge rule of `benchmarks.metrics.seams` (conditions 1 and 2) on the graph of neighbours.
+        """
+        start = np.repeat(np.arange(len(self.points)), self.k)
+        end = self.neighbours.reshape(-1)
+        length = np.linalg.norm(self.points[end] - self.points[start], axis=1)
+        uv_length = np.linalg.norm(self.uv[end] - self.uv[start], axis=1)
+        stretch = np.divide(uv_length, length, out=np.zeros_like(length), where=length > 0)
+        usual = np.quantile(stretch.reshape(-1, self.k), QUARTILE, axis=1, method="lower")
+        torn = (length > 0) & (uv_length > SPANNING_LENGTH * square_side(self.uv))
+        torn &= stretch > SPANNING_STRETCH * np.minimum(usual[start], usual[end])
+        return np.asarray(torn.reshape(-1, self.k).any(axis=1))
+
+
+def point_map(cloud: PointCloud, parameterization: PointParameterization) -> PointMap:
+    """The map of `cloud`.
+
+    Raises:
+        InputError: the numbers of points differ, or there are fewer than four.
+    """
+    points, uv = cloud.points, parameterization.uv
+    if len(points) != len(uv):
+        raise InputError(f"{len(uv)} uv rows for a cloud of {len(points)} points")
+    if len(points) < 4:
+        raise InputError(f"a cloud of {len(points)} points has no neighbourhoods; 4 are needed")
+    return PointMap(points / power_of_two(points), uv / power_of_two(uv))
+
+
+def nearest_others(tree: cKDTree, k: int) -> IntArray:
+    """(P, k) for each point of the tree the k nearest other points, nearest first."""
+    found = tree.query(tree.data, k + 1)[1]
+    # A point comes first in its own list, unless it has duplicates: take it out wherever it is.
+    own = found == np.arange(len(found))[:, None]
+    own[~own.any(axis=1), -1] = True
+    return np.asarray(found[~own].reshape(len(found), k), dtype=np.int64)
+
+
+def local_quasi_conformal_mean(point_map: PointMap) -> float:
+    """Mean of sigma1/sigma2 of the local Jacobians; those of rank < 2 are left out."""
+    return mean(_quasi_conformal(point_map))
+
+
+def local_quasi_conformal_mean_without_spanning(point_map: PointMap) -> float:
+    """The same over the points where the map does not tear."""
+    return mean(_quasi_conformal(point_map)[~point_map.spanning])
+
+
+def _quasi_conformal(point_map: PointMap) -> FloatArray:
+    larger, smaller = point_map.singular_values.T
+    ratio = np.full(len(larger), np.inf)
+    np.divide(larger, smaller, out=ratio, where=smaller > larger * 1e-12)
+    return ratio
+
+
+def local_area_log_ratio_mean(point_map: PointMap) -> float:
+    """Mean of abs(log(sigma1 sigma2) - median of the same); those of rank < 2 are left out."""
+    return mean(_area_log_ratio(point_map))
+
+
+def local_area_log_ratio_mean_without_spanning(point_map: PointMap) -> float:
+    """The same over the points where the map does not tear."""
+    return mean(_area_log_ratio(point_map)[~point_map.spanning])
+
+
+def _area_log_ratio(point_map: PointMap) -> FloatArray:
+    larger, smaller = point_map.singular_values.T
+    known = smaller > larger * 1e-12
+    ratio = np.full(len(larger), np.inf)
+    log = np.log(larger[known]) + np.log(smaller[known])
+    # Without areas there is no total to scale by; the median of the logarithms stands for it.
+    ratio[known] = np.abs(log - np.median(log)) if known.any() else log
+    return ratio
+
+
+def neighbour_trustworthiness(point_map: PointMap) -> float:
+    """How few strangers are among the UV neighbours (Venna and Kaski 2001): 1 if none."""
+    return _rank_agreement(point_map.uv_neighbours, point_map.neighbours, point_map.tree)
+
+
+def neighbour_continuity(point_map: PointMap) -> float:
+    """How few of the neighbours are lost in UV (Venna and Kaski 2001): 1 if none."""
+    return _rank_agreement(point_map.neighbours, point_map.uv_neighbours, point_map.uv_tree)
+
+
+def neighbour_preservation(point_map: PointMap) -> float:
+    """The smaller of trustworthiness and continuity."""
+    return min(neighbour_trustworthiness(point_map), neighbour_continuity(point_map))
+
+
+def _rank_agreement(found: IntArray, expected: IntArray, tree: cKDTree) -> float:
+    """1 - 2 / (n k (2n - 3k - 1)) sum of (rank - k) over `found` that are not `expected`.
+
+    Ranks are by distance in `tree`. 1 where a cloud is too small for the formula.
+    """
+    count, k = found.shape
+    if 2 * count - 3 * k - 1 <= 0:
+        return 1.0
+    asked = np.arange(0, count, -(-count // RANKED_POINTS))
+    stranger = ~(found[asked, :, None] == expected[asked, None, :]).any(axis=2)
+    row, column = np.nonzero(stranger)
+    centre = tree.data[asked[row]]
+    distance = np.linalg.norm(tree.data[found[asked[row], column]] - centre, axis=1)
+    # As many points as lie within the distance, the point itself among them, give the rank + 1.
+    # A little more distance keeps the stranger in, whose own distance is rounded.
+    within = tree.query_ball_point(centre, distance * (1 + 1e-12), return_length=True)
+    excess = np.maximum(np.asarray(within, dtype=np.float64) - 1 - k, 1).sum()
+    return float(1 - 2 * excess / (len(asked) * k * (2 * count - 3 * k - 1)))
+
+
+def uv_collision_fraction(point_map: PointMap) -> float:
+    """Fraction of points whose nearest image belongs to a point far away: sheets on one another.
+
+    Far is more than 5 times the distance to the k-th neighbour.
+    """
+    points = point_map.points
+    nearest = point_map.uv_neighbours[:, 0]
+    distance = np.linalg.norm(points[nearest] - points, axis=1)
+    reach = np.linalg.norm(points[point_map.neighbours[:, -1]] - points, axis=1)
+    return float((distance > SPANNING_STRETCH * reach).mean())
+
+
+def seam_point_fraction(point_map: PointMap) -> float:
+    """Fraction of points with one of the 3 nearest more than 1 % of L away in UV (ParaPoint).
+
+    The threshold is meant for dense clouds: from some 50,000 points on only seams exceed it.
+    """
+    near = point_map.neighbours[:, :SEAM_NEIGHBOURS]
+    distance = np.linalg.norm(point_map.uv[near] - point_map.uv[:, None], axis=2).max(axis=1)
+    return float((distance > SPANNING_LENGTH * square_side(point_map.uv)).mean())
+
+
+def spanning_point_fraction(point_map: PointMap) -> float:
+    """Fraction of points where the map tears between neighbours."""
+    return float(point_map.spanning.mean())

@@ -1,0 +1,1 @@
+"""How cells are run: one process each, within limits, here or on a cluster."""

@@ -1,0 +1,254 @@
+"""Cells on the workers of a cluster: below each, the supervisors of `benchmarks.running.local`.
+
+No file system is shared with a worker: a task carries the content of the files that it reads, and
+its answer that of the map. A worker must have the same version of the project and of the packages
+it asks for; one that has not ends the run with a line that says so.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import socket
+import tempfile
+import threading
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import CancelledError
+from pathlib import Path
+from typing import Any, Self
+
+from benchmarks.running import environment
+from benchmarks.running.local import Local
+from benchmarks.running.tasks import Outcome, Task, Tick
+from benchmarks.store.archives import disk_said, replacing
+from parapoint.errors import InputError
+
+CONNECT_SECONDS = 30
+"""How long a scheduler may take to answer, and its first worker to be there."""
+WORKER_LOST = "two workers died while they ran it; run again"
+"""Reason of a row that the next run does anew: machines go away through no fault of a method."""
+WORKER_GIGABYTES = 2
+"""Memory of a Slurm job beside that of its cell: for the worker and the supervisor."""
+
+Client = Any
+"""A `distributed.Client`; the package is optional, and half of it has no types."""
+
+
+class Remote:
+    """Supervisors below the workers of a dask scheduler."""
+
+    def __init__(
+        self,
+        connected: Callable[[contextlib.ExitStack], Client],
+        folder: Path,
+        jobs: int,
+        tick: Tick,
+    ) -> None:
+        """`connected` makes the client, and leaves what is to be closed after the run."""
+        self.connected = connected
+        self.folder = folder
+        self.threads = environment.threads(environment.cores())
+        self.width = jobs
+        self.tick = tick
+        self.project = environment.project()
+        self.open = contextlib.ExitStack()
+
+    def __enter__(self) -> Self:
+        """Connect.
+
+        Raises:
+            InputError: no scheduler answers, or it has no worker.
+        """
+        shutil.rmtree(self.folder, ignore_errors=True)
+        self.client = self.connected(self.open)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Disconnect; workers that the run has started end."""
+        self.open.close()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def run(self, tasks: Sequence[Task], jobs: int) -> None:
+        """Do all tasks, `jobs` at a time, so that no worker holds one that it does not run."""
+        import distributed
+
+        wait: Any = distributed.wait
+        waiting = deque(tasks)
+        running: dict[Any, Task] = {}  # by their futures
+        while waiting or running:
+            while waiting and len(running) < jobs:
+                task = waiting.popleft()
+                running[self._sent(task)] = task
+                task.began()
+            with contextlib.suppress(TimeoutError, CancelledError):
+                wait(list(running), timeout=0.1, return_when="FIRST_COMPLETED")
+            for future in [future for future in running if future.done()]:
+                self._end(running.pop(future), future)
+            self.tick()
+
+    def _sent(self, task: Task) -> Any:
+        """The future of a task."""
+        plugins = []
+        for plugin in task.job.get("plugins", ()):
+            path, _, name = plugin.rpartition(":")
+            plugins.append((Path(path).name, name, Path(path).read_bytes()))
+        inputs = {name: path.read_bytes() for name, path in task.inputs.items()}
+        return self.client.submit(
+            performed,
+            task.job,
+            inputs,
+            plugins,
+            self.threads,
+            self.project,
+            modules=task.modules,
+            pure=False,
+        )
+
+    def _end(self, task: Task, future: Any) -> None:
+        """Take in the answer to a task.
+
+        Raises:
+            InputError: the scheduler or a worker is of no use for this run.
+        """
+        import distributed
+
+        try:
+            outcome, printed, content = future.result()
+        except distributed.KilledWorker:
+            outcome = {"status": "failed", "reason": WORKER_LOST, "took": 0.0}
+            printed, content = "", b""
+        except (CancelledError, OSError):
+            raise InputError(
+                "the dask scheduler is gone; earlier results are intact: run the same command again"
+            ) from None
+        except ImportError as error:
+            raise InputError(f"a dask worker cannot run the project: {error}") from None
+        path = self.folder / "map.npz"
+        if content:
+            with disk_said(path), replacing(path) as stream:
+                stream.write(content)
+        task.ended(outcome, printed, path)
+
+
+_worker = threading.local()
+"""Of each thread of a dask worker: its supervisor, which all tasks share that it is given."""
+
+
+def performed(
+    job: Mapping[str, Any],
+    inputs: Mapping[str, bytes],
+    plugins: Sequence[tuple[str, str, bytes]],
+    threads: int,
+    project: str,
+    *,
+    modules: tuple[str, ...],
+) -> tuple[Outcome, str, bytes]:
+    """Do a task on a worker: its outcome, the last lines printed, and the map file.
+
+    Args:
+        job: what the supervisor is told.
+        inputs: the content of the files that the task reads.
+        plugins: file name, class and source of each method that comes with it.
+        threads: how many threads it may use.
+        project: version of the project that sends it.
+        modules: what its supervisor is to have imported.
+
+    Raises:
+        InputError: this worker has another version, or its disk is full.
+    """
+    host = socket.gethostname()
+    if environment.project() != project:
+        raise InputError(
+            f"the dask worker on {host} has another version of the project, or of a package that "
+            "it asks for; give it the same, and start it again"
+        )
+    if not hasattr(_worker, "local"):
+        _worker.local = Local(Path(), threads, lambda: None)
+    local: Local = _worker.local
+    answers: list[tuple[Outcome, str, bytes]] = []
+
+    def ended(outcome: Outcome, printed: str, path: Path) -> None:
+        outcome["host"] = f"{host} ({environment.processor()})"
+        answers.append((outcome, printed, path.read_bytes() if path.exists() else b""))
+
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        local.folder = folder / "cells"
+        places = {key: folder / f"{key}.npz" for key in inputs}
+        for key, path in places.items():
+            path.write_bytes(inputs[key])
+        locations = []
+        for n, (file, kind, source) in enumerate(plugins):
+            path = folder / str(n) / file
+            path.parent.mkdir()
+            path.write_bytes(source)
+            locations.append(f"{path}:{kind}")
+        task = Task({**job, "plugins": locations}, places, lambda: None, ended, modules)
+        try:
+            local.run([task], 1)
+        except BaseException:
+            del _worker.local
+            local.__exit__()
+            raise
+    (answer,) = answers
+    return answer
+
+
+def dask_client(address: str, opened: contextlib.ExitStack) -> Client:
+    """A client of the scheduler at `address`, which has a worker.
+
+    Raises:
+        InputError: it does not answer, or has no worker.
+    """
+    import distributed
+
+    connect: Any = distributed.Client
+    try:
+        client = connect(address, timeout=CONNECT_SECONDS)
+    except (OSError, ValueError):
+        raise InputError(
+            f"no dask scheduler answers at {address}: start one with `dask scheduler`"
+        ) from None
+    opened.callback(client.close)
+    try:
+        client.wait_for_workers(1, timeout=CONNECT_SECONDS)
+    except TimeoutError:
+        raise InputError(
+            f"the dask scheduler at {address} has no worker: start some with "
+            f"`dask worker {address} --nthreads 1`"
+        ) from None
+    return _patient_once(client)
+
+
+def slurm_client(jobs: int, memory: float, threads: int, opened: contextlib.ExitStack) -> Client:
+    """A client of `jobs` workers, each a Slurm job; they may wait in the queue for long.
+
+    Partition, account and wall time are those of dask-jobqueue's own configuration
+    (`jobqueue.slurm.queue`, `.account`, `.walltime` in ~/.config/dask/jobqueue.yaml).
+    """
+    import distributed
+    from dask_jobqueue.slurm import SLURMCluster
+
+    connect: Any = distributed.Client
+    start: Any = SLURMCluster
+    cluster = opened.enter_context(
+        start(
+            cores=threads,
+            processes=1,
+            memory=f"{memory + WORKER_GIGABYTES} GB",
+            worker_extra_args=["--nthreads", "1"],
+        )
+    )
+    cluster.scale(jobs=jobs)
+    return _patient_once(opened.enter_context(connect(cluster)))
+
+
+def _patient_once(client: Client) -> Client:
+    """`client`, whose scheduler runs a task whose worker died once again, and no more."""
+
+    def once(dask_scheduler: Any) -> None:  # a closure: the scheduler need not have the project
+        dask_scheduler.allowed_failures = 1
+
+    client.run_on_scheduler(once)
+    return client

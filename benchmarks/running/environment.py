@@ -1,0 +1,111 @@
+"""What a run's numbers depend on besides the code of a method: commit, versions, machine."""
+
+from __future__ import annotations
+
+import datetime as dt
+import functools
+import hashlib
+import importlib.metadata
+import json
+import os
+import platform
+import re
+import subprocess
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[2]
+
+MACHINE = ("python", "packages", "platform", "cpu", "cores", "memory_mb", "gpu")
+"""Entries that say where a cell ran: a cell that failed is tried again where they differ."""
+
+
+def environment() -> dict[str, Any]:
+    """The commit, interpreter, package versions and machine of this process, and the time."""
+    return {
+        "date": dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
+        "commit": _said_by("git", "-C", str(ROOT), "rev-parse", "HEAD"),
+        "dirty": bool(_said_by("git", "-C", str(ROOT), "status", "--porcelain")),
+        "python": platform.python_version(),
+        "packages": _packages(),
+        "platform": platform.platform(),
+        "cpu": processor(),
+        "cores": cores(),
+        "memory_mb": memory() // 10**6,
+        "gpu": _said_by("nvidia-smi", "--query-gpu=name", "--format=csv,noheader").splitlines(),
+    }
+
+
+def cores() -> int:
+    """Number of processor cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def memory() -> int:
+    """Bytes of memory that this machine, or the container on it, has."""
+    import psutil
+
+    total = int(psutil.virtual_memory().total)
+    try:
+        return min(total, int(Path("/sys/fs/cgroup/memory.max").read_text()))
+    except (OSError, ValueError):  # no container, or one without a limit ("max")
+        return total
+
+
+def threads(jobs: int) -> int:
+    """Threads a cell may use while `jobs` run at a time: OMP_NUM_THREADS where the user set it."""
+    wanted = os.environ.get("OMP_NUM_THREADS", "")
+    return int(wanted) if wanted.isdigit() and int(wanted) else max(1, cores() // jobs)
+
+
+def _packages() -> dict[str, str]:
+    """Versions of the packages that the project asks for, those that are installed."""
+    try:
+        wanted = importlib.metadata.requires("parapoint") or []
+    except importlib.metadata.PackageNotFoundError:
+        return {}
+    versions = {"parapoint": importlib.metadata.version("parapoint")}
+    for requirement in wanted:
+        match = re.match(r"[\w.-]+", requirement)
+        name = match.group() if match else requirement
+        try:
+            versions[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return versions
+
+
+@functools.cache
+def processor() -> str:
+    """Name of the processor."""
+    try:
+        for line in Path("/proc/cpuinfo").read_text().splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()
+
+
+@functools.cache
+def project() -> str:
+    """Hash of the project's source and of the versions of the packages that it asks for.
+
+    Where it is the same, so is what comes of a cell or of a map's metrics.
+    """
+    digest = hashlib.sha256(json.dumps(_packages(), sort_keys=True).encode())
+    for package in ("parapoint", "baselines", "benchmarks"):
+        for path in sorted((ROOT / package).glob("*.py")):
+            digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _said_by(*command: str) -> str:
+    """What a program prints, "" where it is missing or fails."""
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=20, check=True)  # noqa: S603  fixed programs
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    return done.stdout.strip()

@@ -1,0 +1,247 @@
+"""Cells on this machine: supervisors (`benchmarks.running.worker`) as child processes."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import os
+import selectors
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections import deque
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Self
+
+import psutil
+
+from benchmarks.running import environment
+from benchmarks.running.tasks import Outcome, Task, Tick
+from benchmarks.store.archives import disk_said
+from parapoint.errors import InputError
+
+GRACE = 15.0
+"""Seconds past its limit after which a supervisor itself counts as hung."""
+OUTPUT_KEPT = 1 << 16
+"""Bytes of a method's output that are held; what came before is dropped."""
+THREAD_VARIABLES = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+    "IGL_NUM_THREADS",
+)
+
+
+class _Slot:
+    """A supervisor process, and the task that it is busy with or gets once it is ready."""
+
+    def __init__(self, threads: int, modules: tuple[str, ...]) -> None:
+        """Start a supervisor with `modules`, whose children may use `threads` threads."""
+        self.modules = modules
+        self.replies, send = os.pipe()
+        variables = dict.fromkeys(THREAD_VARIABLES, str(threads)) | {"PYTHONHASHSEED": "0"}
+        self.process = subprocess.Popen(  # noqa: S603  our own module
+            [sys.executable, "-m", "benchmarks.running.worker", str(send), *modules],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            pass_fds=[send],
+            start_new_session=True,
+            cwd=environment.ROOT,
+            env=os.environ | variables,
+            bufsize=0,
+        )
+        os.close(send)
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        self.jobs = self.process.stdin
+        self.output = self.process.stdout.fileno()
+        os.set_blocking(self.output, False)
+        os.set_blocking(self.replies, False)
+        self.reply = bytearray()
+        self.printed = bytearray()
+        self.ready = False
+        self.task: Task | None = None
+        self.folder = Path()
+        self.started = math.inf
+
+    @property
+    def time_limit(self) -> float:
+        """Seconds that the task may take."""
+        return float(self.task.job["time_limit"]) if self.task else math.inf
+
+    def begin(self, task: Task, folder: Path) -> None:
+        """Begin its task, which may write into `folder`."""
+        self.printed.clear()
+        self.folder = folder
+        self.started = time.monotonic()
+        inputs = {name: str(path.resolve()) for name, path in task.inputs.items()}
+        places = {"map": str(folder / "map.npz"), "work": str(folder / "work")}
+        job = {**task.job, **inputs, **places}
+        with contextlib.suppress(OSError):  # a supervisor that is gone is heard of next
+            self.jobs.write(json.dumps(job).encode() + b"\n")
+
+    def hear(self) -> list[Outcome] | None:
+        """Outcomes that have come in; None once the supervisor is gone."""
+        content = _available(self.replies)
+        if content is None:
+            return None
+        *lines, self.reply = (self.reply + content).split(b"\n")
+        return [json.loads(line) for line in lines]
+
+    def drain(self) -> None:
+        """Take in what was printed, so that no method waits for a reader; keep the end of it."""
+        self.printed += _available(self.output) or b""
+        del self.printed[:-OUTPUT_KEPT]
+
+    def close(self) -> None:
+        """End the supervisor and with it all that runs below it."""
+        with contextlib.suppress(OSError):
+            self.jobs.close()
+        try:
+            self.process.wait(GRACE / 3)
+        except subprocess.TimeoutExpired:
+            with contextlib.suppress(psutil.Error):
+                for process in psutil.Process(self.process.pid).children(recursive=True):
+                    with contextlib.suppress(psutil.Error):
+                        process.kill()
+            self.process.kill()
+            self.process.wait()
+        assert self.process.stdout is not None
+        self.process.stdout.close()
+        os.close(self.replies)
+
+
+def _available(pipe: int) -> bytes | None:
+    """What can be read from `pipe` at once, one megabyte or so at most; None at its end."""
+    content = bytearray()
+    while len(content) < 1 << 20:
+        try:
+            chunk = os.read(pipe, 1 << 16)
+        except BlockingIOError:
+            break
+        if not chunk:
+            return bytes(content) or None
+        content += chunk
+    return bytes(content)
+
+
+class Local:
+    """Supervisors on this machine."""
+
+    def __init__(self, folder: Path, threads: int, tick: Tick) -> None:
+        """Tasks write into folders below `folder`, which goes with the executor."""
+        self.folder = folder
+        self.threads = threads
+        self.width = environment.cores()
+        self.tick = tick
+        self.selector = selectors.DefaultSelector()
+        self.slots: set[_Slot] = set()
+        self.harmful: set[tuple[str, ...]] = set()
+        """Modules whose import ended a supervisor: tasks import these themselves."""
+
+    def __enter__(self) -> Self:
+        """Clear what a run that was killed has left."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End all supervisors and what runs below them."""
+        for slot in self.slots:
+            slot.close()
+        self.selector.close()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def run(self, tasks: Sequence[Task], jobs: int) -> None:
+        """Do all tasks, `jobs` at a time."""
+        waiting = deque(tasks)
+        while waiting or self._busy():
+            while waiting and self._busy() < jobs:
+                self._assign(waiting.popleft())
+            self._listen()
+            self.tick()
+
+    def _busy(self) -> int:
+        return sum(slot.task is not None for slot in self.slots)
+
+    def _assign(self, task: Task) -> None:
+        """Give `task` to an idle supervisor that has its modules, or to a new one."""
+        modules = () if task.modules in self.harmful else task.modules
+        for slot in self.slots:
+            if slot.task is None and slot.modules == modules:
+                slot.task = task
+                self._begin(slot, task)
+                return
+        slot = _Slot(self.threads, modules)
+        slot.task = task
+        self.slots.add(slot)
+        self.selector.register(slot.replies, selectors.EVENT_READ, slot)
+        self.selector.register(slot.output, selectors.EVENT_READ, slot)
+
+    def _begin(self, slot: _Slot, task: Task) -> None:
+        with disk_said(self.folder):
+            self.folder.mkdir(exist_ok=True)
+            folder = Path(tempfile.mkdtemp(dir=self.folder)).resolve()
+            (folder / "work").mkdir()
+        slot.begin(task, folder)
+        task.began()
+
+    def _listen(self) -> None:
+        """Wait a moment for news, and deal with it."""
+        for slot in {key.data for key, _ in self.selector.select(0.1)}:
+            news = slot.hear()
+            slot.drain()
+            for outcome in news or ():
+                if slot.task is not None and slot.ready:
+                    self._end(slot, outcome)
+                elif slot.task is not None:
+                    slot.ready = True
+                    self._begin(slot, slot.task)
+            if news is None:
+                self._lost(slot)
+        now = time.monotonic()
+        for slot in [slot for slot in self.slots if now > slot.started + slot.time_limit + GRACE]:
+            self._lost(slot)
+
+    def _lost(self, slot: _Slot) -> None:
+        """Deal with a supervisor that is gone or hangs: a task that it had begun ends with it."""
+        self.slots.discard(slot)
+        self.selector.unregister(slot.replies)
+        self.selector.unregister(slot.output)
+        slot.close()
+        if not slot.ready and slot.modules and slot.task is not None:
+            self.harmful.add(slot.modules)
+            self._assign(slot.task)
+        elif not slot.ready or slot.task is None:
+            said = last_lines(slot.printed, lines=1)
+            raise RuntimeError(f"benchmarks.running.worker ended unasked: {said}")
+        elif time.monotonic() > slot.started + slot.time_limit:
+            reason = f"not done within the limit of {slot.time_limit:g} s, and hard to kill"
+            self._end(slot, {"status": "timeout", "reason": reason})
+        else:
+            reason = "killed the process that watched over it"
+            self._end(slot, {"status": "failed", "reason": reason})
+
+    def _end(self, slot: _Slot, outcome: Outcome) -> None:
+        task = slot.task
+        assert task is not None
+        slot.task = None
+        if outcome["status"] == "stop":
+            raise InputError(
+                f"{outcome['reason']}; earlier results are intact: mend that and run again"
+            )
+        outcome["took"] = time.monotonic() - slot.started
+        task.ended(outcome, last_lines(slot.printed), slot.folder / "map.npz")
+        shutil.rmtree(slot.folder, ignore_errors=True)
+
+
+def last_lines(printed: bytes | bytearray, lines: int = 20, characters: int = 4000) -> str:
+    """The end of what a method printed."""
+    text = printed.decode(errors="replace")[-characters:]
+    return "\n".join(text.splitlines()[-lines:])

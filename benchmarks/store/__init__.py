@@ -1,0 +1,1 @@
+"""Where results are kept: rows, maps and metrics on disk."""

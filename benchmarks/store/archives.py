@@ -1,0 +1,199 @@
+"""The files of a result store: arrays in npz files, written all or nothing; none is unpickled."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import hashlib
+import math
+import os
+import typing
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from parapoint.errors import InputError
+from parapoint.surfaces.parameterization import Parameterization, PointParameterization, TracePoint
+from parapoint.surfaces.surface import Mesh, PointCloud, Surface
+
+Arrays = Mapping[str, npt.NDArray[Any]]
+_DAMAGE = (
+    *(OSError, EOFError, ValueError, TypeError, AttributeError, KeyError, MemoryError),
+    *(NotImplementedError, zipfile.BadZipFile, zlib.error),
+)
+"""What reading a damaged archive raises."""
+
+
+def arrays_hash(arrays: Arrays) -> str:
+    """64 hexadecimal digits over the names, shapes and values of `arrays`."""
+    digest = hashlib.sha256()
+    for name, array in sorted(arrays.items()):
+        digest.update(f"{name} {array.dtype.str} {array.shape} ".encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
+def surface_arrays(surface: Surface) -> dict[str, npt.NDArray[Any]]:
+    """The arrays that make up `surface`."""
+    if isinstance(surface, Mesh):
+        return {"vertices": surface.vertices, "faces": surface.faces}
+    if surface.normals is None:
+        return {"points": surface.points}
+    return {"points": surface.points, "normals": surface.normals}
+
+
+def map_arrays(result: Parameterization | PointParameterization) -> dict[str, npt.NDArray[Any]]:
+    """The arrays that make up the map itself, its trace apart."""
+    if isinstance(result, Parameterization):
+        return {"uv": result.uv, "corners": result.corners}
+    return {"uv": result.uv}
+
+
+def trace_arrays(trace: tuple[TracePoint, ...]) -> dict[str, npt.NDArray[Any]]:
+    """A trace as arrays: absent values are NaN, the map of point n is `trace_uv_<n>`."""
+    if not trace:
+        return {}
+    steps, seconds, terms, maps = zip(*trace, strict=True)
+    names = list(dict.fromkeys(name for term in terms for name in term))
+    values = [[float(term.get(name, math.nan)) for name in names] for term in terms]
+    arrays: dict[str, npt.NDArray[Any]] = {
+        "trace_iteration": np.array(steps, dtype=np.int64),
+        "trace_seconds": np.array(seconds, dtype=np.float64),
+        "trace_names": np.array(names, dtype=np.str_),
+        "trace_values": np.array(values, dtype=np.float64).reshape(len(trace), len(names)),
+    }
+    for n, uv in enumerate(maps):
+        if uv is not None:
+            arrays[f"trace_uv_{n}"] = np.asarray(uv, dtype=np.float64)
+    return arrays
+
+
+def _trace(arrays: Arrays) -> tuple[TracePoint, ...]:
+    """The trace that `trace_arrays` wrote."""
+    if "trace_iteration" not in arrays:
+        return ()
+    names = [str(name) for name in arrays["trace_names"]]
+    return tuple(
+        TracePoint(
+            int(iteration),
+            float(arrays["trace_seconds"][n]),
+            {
+                name: float(value)
+                for name, value in zip(names, arrays["trace_values"][n], strict=True)
+                if not math.isnan(value)
+            },
+            arrays.get(f"trace_uv_{n}"),
+        )
+        for n, iteration in enumerate(arrays["trace_iteration"])
+    )
+
+
+def write_arrays(path: Path, arrays: Arrays) -> None:
+    """Write `arrays` to the npz file `path`, all or nothing, and onto the disk."""
+    # Indices are most of a map's size, and 32 bits hold them: half the bytes to compress.
+    small = {
+        name: array.astype(np.int32)
+        if array.dtype == np.int64 and array.size and abs(array).max() < 2**31
+        else array
+        for name, array in arrays.items()
+    }
+    with replacing(path) as stream:
+        np.savez_compressed(stream, allow_pickle=False, **small)
+
+
+def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
+    """The arrays of the npz file `path`; nothing in it is unpickled.
+
+    Raises:
+        InputError: the file is missing or damaged.
+    """
+    try:
+        # Opened here: numpy leaves the file open where it is no archive.
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+    except FileNotFoundError:
+        raise InputError(f"{path}: missing") from None
+    except _DAMAGE as error:
+        raise InputError(f"{path}: damaged ({error})") from None
+    return {
+        name: array.astype(np.int64) if array.dtype == np.int32 else array
+        for name, array in arrays.items()
+    }
+
+
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[typing.IO[bytes]]:
+    """A stream whose content becomes the file `path`, in one step, when the block ends well."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with part.open("wb") as stream:
+            yield stream
+            stream.flush()
+            os.fsync(stream.fileno())
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+    sync_folder(path.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Put the names in `folder` onto the disk, where the system can."""
+    with contextlib.suppress(OSError, AttributeError):
+        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+@contextlib.contextmanager
+def disk_said(path: Path) -> Iterator[None]:
+    """Says a full disk, or a limit on files that is reached, in one clear line."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno in {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}:
+            raise InputError(
+                f"{path}: {os.strerror(error.errno).lower()}; earlier results are intact: make "
+                "room and run the same command again"
+            ) from None
+        raise
+
+
+def read_surface(path: Path) -> Surface:
+    """The surface in a file of the store.
+
+    Raises:
+        InputError: the file is missing or damaged.
+    """
+    arrays = read_arrays(path)
+    try:
+        if "faces" in arrays:
+            return Mesh(arrays["vertices"], arrays["faces"])
+        return PointCloud(arrays["points"], arrays.get("normals"))
+    except (InputError, KeyError) as error:
+        raise InputError(f"{path}: damaged ({error})") from None
+
+
+def read_map(
+    path: Path, report: Mapping[str, object] | None = None
+) -> Parameterization | PointParameterization:
+    """The map in a file of the store, with its trace.
+
+    Raises:
+        InputError: the file is missing or damaged.
+    """
+    arrays = read_arrays(path)
+    try:
+        trace = _trace(arrays)
+        if "corners" in arrays:
+            return Parameterization(arrays["uv"], arrays["corners"], trace, report or {})
+        return PointParameterization(arrays["uv"], trace, report or {})
+    except (InputError, KeyError, IndexError, ValueError, TypeError) as error:
+        raise InputError(f"{path}: damaged ({error})") from None

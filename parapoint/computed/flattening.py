@@ -1,0 +1,307 @@
+"""A nearly conformal map of a bare cloud with short seams, computed without training.
+
+The cloud is triangulated, cut, and flattened by a bijective map. The cuts lead to where the scale
+of a conformal map, found by a linear solve, is most extreme (as in Sawhney and Crane 2017,
+"Boundary first flattening", section 6), and are as long as an even scale needs, and to what would
+be too small for numbers without. The map is laid out by that scale (`parapoint.computed.layout`),
+then made bijective (`parapoint.computed.bijection`).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from parapoint.computed.bijection import FLATTEST, bijective_map, signed_areas, tutte
+from parapoint.computed.denoising import denoised
+from parapoint.computed.layout import scaled_layout
+from parapoint.computed.reconstruction import ReconstructionError, defects, triangulation
+from parapoint.computed.scale import area_discrepancy, even_scale, log_scale, mapped_areas, turning
+from parapoint.surfaces.cutting import cut_along, cut_to_disk
+from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
+
+AREA_DISCREPANCY = 0.6
+"""Cuts are added until the predicted total area discrepancy is this small."""
+OPEN_SEAM, CLOSED_SEAM = 0.022, 0.037
+"""Most seam edges, as a fraction of the faces, on surfaces with and without boundary."""
+FEWER_DEFECTS = 0.5
+"""Share of its defects that a triangulation keeps at most where the points are noisy: 0.06 to 0.2
+with noise of 0.5 and 1 % of the diagonal, 0.6 to 3 on models with details as fine as the
+spacing."""
+TIPS = 3
+"""Extremal points that are tried as the tip of each cut."""
+MOST_OPENINGS = 50
+"""Cuts at most to what Tutte's embedding flattens; one to three were needed where any was."""
+LONELY = 6.0
+"""Cost of a vertex most of whose edges cross the seam, in such edges' share."""
+SWEEPS = 10
+"""Passes over the seam in the choice of sides."""
+LEAST_PART = 0.5
+"""Share of the points that the triangulation must reach."""
+
+
+class FlatMap(NamedTuple):
+    """A map at A anchors, the points of the cloud that the triangulation reached.
+
+    Attributes:
+        anchors: (A,) rows of the cloud.
+        uv: (A, 2) images; the map keeps the total area.
+        jacobians: (A, 2, 3) d uv / d x.
+        inverse_jacobians: (A, 3, 2) d x / d uv.
+        facts: what was found, for reports: genus and boundary loops of the triangulation, faces,
+            seam edges, whether it is of the denoised points.
+    """
+
+    anchors: IntArray
+    uv: FloatArray
+    jacobians: FloatArray
+    inverse_jacobians: FloatArray
+    facts: dict[str, Any]
+
+
+def flat_map(points: FloatArray, deadline: float = math.inf) -> FlatMap:
+    """A nearly conformal map of distinct points (N, 3), less so where `deadline` ends the descents.
+
+    Raises:
+        ReconstructionError: the points show no surface that can be followed and flattened.
+    """
+    mesh, is_denoised = _still(points)
+    reached = np.flatnonzero(mesh.referenced)
+    if len(reached) < LEAST_PART * len(points):
+        raise ReconstructionError(
+            f"the largest component holds {len(reached)} of {len(points)} points"
+        )
+    row = np.full(len(points), -1, dtype=np.int64)
+    row[reached] = np.arange(len(reached))
+    mesh = Mesh(mesh.vertices[reached], row[mesh.faces])
+    try:
+        disk = _seamed(mesh)
+        uv = bijective_map(disk, _layout(disk), deadline)
+    except (RuntimeError, np.linalg.LinAlgError) as error:  # a singular factor, no bijection
+        raise ReconstructionError(f"the triangulation has no flat map ({error})") from None
+    uv -= (uv.max(axis=0) + uv.min(axis=0)) / 2
+    uv *= np.sqrt(disk.face_areas.sum() / signed_areas(uv, disk.faces).sum())
+    chosen = _chosen_copies(disk, _origin(mesh, disk))
+    jacobians = _vertex_jacobians(disk, uv)[chosen]
+    boundary = [int((of.edge_face_count == 1).sum()) for of in (mesh, disk)]
+    facts = {
+        "genus": mesh.genus,
+        "boundary_loops": len(mesh.boundary_loops),
+        "faces": len(mesh.faces),
+        "seam_edges": (boundary[1] - boundary[0]) // 2,
+        "denoised": is_denoised,
+    }
+    inverse: FloatArray = np.asarray(np.linalg.pinv(jacobians, rcond=0.1), dtype=np.float64)
+    return FlatMap(reached, uv[chosen], jacobians, inverse, facts)
+
+
+def _still(points: FloatArray) -> tuple[Mesh, bool]:
+    """A triangulation of points (N, 3), and whether it is of the denoised ones.
+
+    Details as fine as the spacing look like noise. So that they stay, the denoised points are taken
+    only where most defects of the triangulation go with the noise.
+    """
+    mesh, moved = triangulation(points), denoised(points)
+    if moved is points:
+        return mesh, False
+    smooth = triangulation(moved)
+    if defects(smooth) > FEWER_DEFECTS * defects(mesh):
+        return mesh, False
+    return smooth, True
+
+
+def _seamed(mesh: Mesh) -> Mesh:
+    """The mesh cut to a planar domain whose flat map has the scale that is asked for."""
+    share = OPEN_SEAM if mesh.boundary_loops else CLOSED_SEAM
+    budget = int(share * len(mesh.faces))
+    opened = mesh
+    if mesh.genus > 0 or not mesh.boundary_loops:
+        opened = cut_to_disk(mesh)
+    opened = _joined_loops(opened)
+    opened = _scale_cuts(opened, budget - (len(opened.vertices) - len(mesh.vertices)))
+    return _embeddable(opened)
+
+
+def _layout(disk: Mesh) -> FloatArray | None:
+    """(V, 2) a map of even scale, faces perhaps on one another; None where there are holes.
+
+    Around a hole the frames come back turned by a full turn, but not to the same place.
+    """
+    if len(disk.boundary_loops) > 1:
+        return None
+    return scaled_layout(disk, even_scale(disk))
+
+
+def _origin(mesh: Mesh, cut: Mesh) -> IntArray:
+    """(M,) the vertex of `mesh` that each one of `cut` is or copies."""
+    origin = np.empty(len(cut.vertices), dtype=np.int64)
+    origin[cut.faces] = mesh.faces
+    return origin
+
+
+def _graph(mesh: Mesh) -> sparse.csr_matrix:
+    """The symmetric (V, V) graph of the edges; their lengths plus the mean, so few are best."""
+    i, j = mesh.edges.T
+    length = np.linalg.norm(mesh.vertices[i] - mesh.vertices[j], axis=1)
+    upper = sparse.coo_matrix((length + length.mean(), (i, j)), (len(mesh.vertices),) * 2)
+    return (upper + upper.T).tocsr()
+
+
+def _path(previous: IntArray, vertex: int) -> IntArray:
+    """(n, 2) edges from `vertex` back to the root of its tree in `previous`."""
+    path = [vertex]
+    while previous[path[-1]] >= 0:
+        path.append(int(previous[path[-1]]))
+    return np.stack([path[:-1], path[1:]], axis=1).astype(np.int64)
+
+
+def _joined_loops(mesh: Mesh) -> Mesh:
+    """The planar domain cut between the boundary loops that a flat planar map cannot have.
+
+    In the flat metric an inner loop turns by −2π; one that turns otherwise, such as the end of a
+    tube, is joined to the nearest other loop.
+    """
+    while len(loops := mesh.boundary_loops) > 1:
+        turns = turning(mesh, log_scale(mesh, flat_loops=False))
+        wrong = np.abs(turns + 2 * np.pi)
+        wrong[turns.argmax()] = 0
+        worst = int(wrong.argmax())
+        if wrong[worst] < np.pi:
+            break
+        distance, previous, _ = csgraph.dijkstra(
+            _graph(mesh), indices=loops[worst], return_predecessors=True, min_only=True
+        )
+        others = np.concatenate([loop for i, loop in enumerate(loops) if i != worst])
+        mesh = cut_along(mesh, _path(previous, int(others[distance[others].argmin()])))
+    return mesh
+
+
+def _scale_cuts(mesh: Mesh, budget: int) -> Mesh:
+    """The planar domain cut from its boundary to where the scale is most extreme.
+
+    Extreme is what is far from the boundary and in its log scale from the mean area's. Of some such
+    tips the one with the largest gain for each cut edge is taken, until the area discrepancy is
+    small enough or `budget` edges are cut.
+    """
+    scale, area = log_scale(mesh), mesh.face_areas.sum()
+    discrepancy = area_discrepancy(mesh, scale)
+    while discrepancy > AREA_DISCREPANCY:
+        graph = _graph(mesh)
+        distance, previous, _ = csgraph.dijkstra(
+            graph,
+            indices=np.concatenate(mesh.boundary_loops),
+            return_predecessors=True,
+            min_only=True,
+        )
+        extreme = distance * np.abs(scale - np.log(mapped_areas(mesh, scale).sum() / area) / 2)
+        candidates = []
+        blocked = np.zeros(len(scale), dtype=bool)
+        for _ in range(TIPS):
+            tip = int(np.where(blocked, -1.0, extreme).argmax())
+            blocked |= np.isfinite(csgraph.dijkstra(graph, indices=tip, limit=distance[tip] / 2))
+            path = _path(previous, tip)
+            if not 0 < len(path) <= budget:
+                continue
+            cut = cut_along(mesh, path)
+            new_scale = log_scale(cut)
+            new_discrepancy = area_discrepancy(cut, new_scale)
+            gain = (discrepancy - new_discrepancy) / len(path)
+            candidates.append((gain, len(path), cut, new_scale, new_discrepancy))
+        if not candidates:
+            break
+        gain, length, cut, new_scale, new_discrepancy = max(candidates, key=lambda row: row[0])
+        if gain <= 0:
+            break
+        mesh, scale, discrepancy, budget = cut, new_scale, new_discrepancy, budget - length
+    return mesh
+
+
+def _embeddable(mesh: Mesh) -> Mesh:
+    """The planar domain cut until Tutte's embedding has room for all of its faces.
+
+    It shrinks a horn or a tail exponentially from its foot to its tip, and so it does a strip of
+    triangles that hangs into a hole. A cut from the outer loop to the far end of what is too flat
+    for numbers, or to the hole, brings this to the rim of the disk.
+    """
+    for _ in range(MOST_OPENINGS):
+        flat = ~(signed_areas(tutte(mesh), mesh.faces) > FLATTEST)
+        if not flat.any():
+            break
+        loops = mesh.boundary_loops
+        distance, previous, _ = csgraph.dijkstra(
+            _graph(mesh), indices=loops[0], return_predecessors=True, min_only=True
+        )
+        squeezed = np.unique(mesh.faces[flat])
+        path = _path(previous, int(squeezed[distance[squeezed].argmax()]))
+        at_hole = np.flatnonzero(np.isin(path[:, 0], np.concatenate(loops)))
+        path = path[at_hole[-1] :] if len(at_hole) else path
+        if not len(path):
+            break
+        mesh = cut_along(mesh, path)
+    return mesh
+
+
+def _vertex_jacobians(mesh: Mesh, uv: FloatArray) -> FloatArray:
+    """(V, 2, 3) d uv / d x: means of the affine maps of the faces around, weighted by area."""
+
+    def edges(values: FloatArray) -> FloatArray:
+        corners = values[mesh.faces]
+        return np.stack([corners[:, k] - corners[:, 0] for k in (1, 2)], axis=2)
+
+    weight = mesh.face_areas
+    by_face = weight[:, None, None] * (edges(uv) @ np.linalg.pinv(edges(mesh.vertices), rcond=1e-3))
+    total = np.bincount(mesh.faces.reshape(-1), np.repeat(weight, 3), len(uv))
+    jacobians = np.zeros((len(uv), 2, 3))
+    for corner in mesh.faces.T:
+        np.add.at(jacobians, corner, by_face)
+    return jacobians / np.maximum(total, 1e-300)[:, None, None]
+
+
+def _chosen_copies(disk: Mesh, origin: IntArray) -> IntArray:
+    """(N,) the one vertex of `disk` that stands for each of the N uncut ones, `origin` (M,).
+
+    A point on the seam goes to one of its sides. By coordinate descent on the share of edges that
+    bridge the seam, and LONELY times what it exceeds a half at any vertex, so that the seam runs
+    between two rows of points without notches.
+    """
+    chosen = np.empty(int(origin.max()) + 1, dtype=np.int64)
+    chosen[origin] = np.arange(len(origin))
+    for loop in disk.boundary_loops:  # begin with one whole side of each cut
+        chosen[origin[loop]] = loop
+    links = np.concatenate([disk.edges, disk.edges[:, ::-1]])
+    is_copied = np.bincount(origin)[origin] > 1
+    near = np.zeros(len(chosen), dtype=bool)
+    near[origin[is_copied]] = True
+    near[origin[links[is_copied[links[:, 1]], 0]]] = True
+    linked: set[tuple[int, int]] = set()
+    ring: dict[int, set[int]] = {}
+    for i, j in links[near[origin[links[:, 0]]]].tolist():
+        linked.add((i, j))
+        ring.setdefault(int(origin[i]), set()).add(int(origin[j]))
+    copies: dict[int, list[int]] = {}
+    for copy in np.flatnonzero(is_copied).tolist():
+        copies.setdefault(int(origin[copy]), []).append(copy)
+    side: list[int] = chosen.tolist()
+
+    def cost(vertex: int) -> float:
+        bridging = [(side[vertex], side[other]) not in linked for other in ring[vertex]]
+        share = sum(bridging) / len(bridging)
+        return share + LONELY * max(0.0, share - 0.5)
+
+    for _ in range(SWEEPS):
+        before = list(side)
+        for vertex, group in copies.items():
+            around = [vertex, *(other for other in ring[vertex] if other in ring)]
+            present, costs = side[vertex], {}
+            for copy in group:
+                side[vertex] = copy
+                costs[copy] = sum(cost(other) for other in around)
+            best = min(group, key=costs.__getitem__)
+            side[vertex] = best if costs[best] < costs[present] - 1e-9 else present
+        if side == before:
+            break
+    return np.array(side)

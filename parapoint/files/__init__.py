@@ -1,0 +1,1 @@
+"""Files that hold surfaces: how they are read and written."""

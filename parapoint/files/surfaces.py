@@ -1,0 +1,385 @@
+"""Surfaces and maps from files and to files.
+
+Vertices and faces keep the order of the file (STL and glTF, which repeat vertices, are welded;
+see `parapoint.files.mesh_formats`). Every fault of a file is one InputError that names it.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import struct
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+import numpy.typing as npt
+
+from parapoint.errors import InputError
+from parapoint.files import mesh_formats, point_formats
+from parapoint.files.mesh_formats import NO_UV, Content
+from parapoint.surfaces.parameterization import Parameterization
+from parapoint.surfaces.surface import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    Mesh,
+    PointCloud,
+    Surface,
+    read_only,
+)
+
+FORMATS: dict[str, Callable[[bytes, Path], Content]] = {
+    ".obj": lambda data, _: mesh_formats.obj(data),
+    ".ply": lambda data, _: mesh_formats.ply(data),
+    ".off": lambda data, _: mesh_formats.off(data),
+    ".stl": lambda data, _: mesh_formats.stl(data),
+    ".glb": mesh_formats.glb,
+    ".gltf": mesh_formats.gltf,
+    ".xyz": lambda data, _: point_formats.xyz(data),
+    ".pts": lambda data, _: point_formats.pts(data),
+    ".pcd": lambda data, _: point_formats.pcd(data),
+    ".las": lambda data, _: point_formats.las(data),
+    ".laz": lambda data, _: point_formats.las(data),
+}
+"""Reader of each file name ending; it gets the bytes and the folder of the file."""
+
+ROWS_WRITTEN = 65_536
+"""Points written at a time, which bounds the memory that their text takes beside them."""
+
+UV_FORMATS = (".obj", ".glb", ".gltf")
+
+logger = logging.getLogger("parapoint")
+
+
+def read_surface(path: str | Path) -> Surface:
+    """The surface in a file: a Mesh, or a PointCloud where the file has no faces.
+
+    Polygons become triangles in place: a quad is cut along its first diagonal, or along the
+    second if it would fold along the first; larger polygons are fanned from their first corner.
+    STL repeats each vertex in each triangle: equal ones are welded, so that the mesh is connected.
+    Points with a NaN or infinite coordinate are dropped with a logged warning, vertices are not.
+
+    Raises:
+        InputError: there is no such file, its ending is unknown, or it cannot be read; coordinates
+            of a mesh are not finite or an index is out of range; no point of a cloud is finite.
+    """
+    path = Path(path)
+    with faults_of(path):
+        content = _content(path)
+        return _mesh(content)[0] if len(content.sizes) else _point_cloud(content, path)
+
+
+def read_parameterized(path: str | Path) -> tuple[Mesh, Parameterization]:
+    """The mesh in an OBJ (with vt) or glTF file, and the UV map that it carries.
+
+    Rows of `uv` are the file's, but for two habits of exporters, so that a seam is a place where
+    the map is cut. Where several rows hold the same UV for the same vertex, all corners use the
+    first. A row that serves several places of the surface, as where each UV is written once
+    and charts lie over each other, is repeated at the end, once for each further place.
+
+    Raises:
+        InputError: as for `read_surface`; the format carries no UV, the file has none or not for
+            all faces; a UV is not finite or its index is out of range.
+    """
+    path = Path(path)
+    with faults_of(path):
+        if path.suffix.lower() in FORMATS and path.suffix.lower() not in UV_FORMATS:
+            raise InputError("this format carries no UV map; give an OBJ with vt lines, or GLB")
+        content = _content(path)
+        if len(content.sizes) == 0:
+            raise InputError("has no faces; a UV map needs a mesh")
+        if content.uv is None or content.uv_corners is None:
+            raise InputError("has no UV coordinates")
+        mesh, rows = _mesh(content)
+        corners = content.uv_corners[rows]
+        bare = (corners == NO_UV).any(axis=1)
+        if bare.any():
+            raise InputError(
+                f"{int(bare.sum())} of {len(bare)} triangles have no UV; each must have one"
+            )
+        outside = (corners < 0) | (corners >= len(content.uv))
+        if outside.any():
+            raise InputError(
+                f"triangle {int(np.flatnonzero(outside.any(axis=1))[0])} has a UV index out of "
+                f"range; the file has {len(content.uv)} UV coordinates"
+            )
+        uv = read_only(content.uv, np.float64, "uv", 2)
+        corners = _shared_corners(mesh, uv, corners)
+        return mesh, Parameterization(*_rows_of_one_place(mesh, uv, corners))
+
+
+@contextmanager
+def faults_of(path: Path) -> Iterator[None]:
+    """Whatever is wrong with a file while it is read becomes one InputError line that names it."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    except MemoryError:
+        raise InputError(f"{path}: is too large for the memory of this machine") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except Exception as error:
+        kind = path.suffix.lstrip(".").upper()
+        detail = " ".join(str(error).split())[:200] or type(error).__name__
+        raise InputError(f"{path}: is no {kind} file that can be read ({detail})") from error
+
+
+def _content(path: Path) -> Content:
+    """What the file holds, by the reader of its ending."""
+    reader = FORMATS.get(path.suffix.lower())
+    if path.is_dir():
+        raise InputError("is a folder, not a file")
+    if not path.exists():
+        raise InputError("no such file")
+    if reader is None:
+        raise InputError(f"has an unknown ending; known are {', '.join(FORMATS)}")
+    if not path.is_file():
+        raise InputError("is not a regular file")
+    data = path.read_bytes()
+    if not data.strip():
+        raise InputError("is empty")
+    return reader(data, path.parent)
+
+
+def _mesh(content: Content) -> tuple[Mesh, IntArray]:
+    """The triangle mesh, and for each triangle corner its place (F, 3) among polygon corners."""
+    small = content.sizes < 3
+    if small.any():
+        face = int(np.flatnonzero(small)[0])
+        raise InputError(f"face {face} has {int(content.sizes[face])} corners; it needs three")
+    vertices = read_only(content.vertices, np.float64, "vertices", 3)
+    outside = (content.corners < 0) | (content.corners >= len(vertices))
+    if outside.any():
+        corner = int(np.flatnonzero(outside)[0])
+        face = int(np.searchsorted(np.cumsum(content.sizes), corner, side="right"))
+        raise InputError(
+            f"face {face} has a vertex index out of range; the file has {len(vertices)} vertices"
+        )
+    rows = triangle_rows(vertices, content.sizes, content.corners)
+    return Mesh(vertices, content.corners[rows]), rows
+
+
+def triangle_rows(vertices: FloatArray, sizes: IntArray, corners: IntArray) -> IntArray:
+    """(F, 3) places in `corners` of the triangles of polygons, polygon by polygon.
+
+    A polygon of n corners gives n - 2 triangles, a fan from its first corner; a quad that would
+    fold along that diagonal (the two triangles face away from each other) is fanned from its
+    second corner, which is right for every planar quad.
+
+    Args:
+        vertices: (V, 3) positions, finite.
+        sizes: (N,) corners of each polygon, at least 3.
+        corners: (sum of sizes,) rows of `vertices`.
+    """
+    starts = np.cumsum(sizes) - sizes
+    turn = np.zeros(len(sizes), dtype=np.int64)
+    quads = np.flatnonzero(sizes == 4)
+    if len(quads):
+        scale = float(np.abs(vertices).max()) or 1.0  # products of huge coordinates overflow
+        a, b, c, d = (vertices[corners[starts[quads] + k]] / scale for k in range(4))
+        first, second = np.cross(b - a, c - a), np.cross(c - a, d - a)
+        turn[quads] = (first * second).sum(axis=1) < 0
+    count = sizes - 2
+    step = mesh_formats.ranges(np.ones_like(count), count)
+    place = np.stack([np.zeros_like(step), step, step + 1], axis=1)
+    start, shift, size = (np.repeat(values, count)[:, None] for values in (starts, turn, sizes))
+    return np.asarray(start + (place + shift) % size)
+
+
+def _shared_corners(mesh: Mesh, uv: FloatArray, corners: IntArray) -> IntArray:
+    """`corners` with the first of all rows that hold the same UV for the same vertex."""
+    flat = corners.reshape(-1)
+    order = np.lexsort((flat, uv[flat, 1], uv[flat, 0], mesh.faces.reshape(-1)))
+    keys = np.column_stack([mesh.faces.reshape(-1), uv[flat]])[order]
+    fresh = np.ones(len(flat), dtype=bool)
+    fresh[1:] = (keys[1:] != keys[:-1]).any(axis=1)
+    shared = np.empty_like(flat)
+    shared[order] = flat[order][fresh][np.cumsum(fresh) - 1]
+    return shared.reshape(-1, 3)
+
+
+def _rows_of_one_place(
+    mesh: Mesh, uv: FloatArray, corners: IntArray
+) -> tuple[FloatArray, IntArray]:
+    """`uv` and `corners` with a further row for each further place that a row serves."""
+    row, position = corners.reshape(-1), mesh.vertices[mesh.faces.reshape(-1)]
+    served = np.zeros((len(uv), 3))
+    served[row] = position
+    if np.array_equal(served[row], position):
+        return uv, corners
+    _, place = np.unique(position, axis=0, return_inverse=True)
+    pairs, pair = np.unique(np.stack([row, place.reshape(-1)], axis=1), axis=0, return_inverse=True)
+    again = np.zeros(len(pairs), dtype=bool)
+    again[1:] = pairs[1:, 0] == pairs[:-1, 0]
+    new_row = np.where(again, len(uv) + np.cumsum(again) - 1, pairs[:, 0])
+    return np.concatenate([uv, uv[pairs[again, 0]]]), new_row[pair.reshape(-1)].reshape(-1, 3)
+
+
+def _point_cloud(content: Content, path: Path) -> PointCloud:
+    """The finite points, with normals where all of them have one."""
+    finite: BoolArray = np.asarray(np.isfinite(content.vertices).all(axis=1))
+    if not finite.any():
+        raise InputError(
+            "has no point" if len(finite) == 0 else "has no point with finite coordinates"
+        )
+    if not finite.all():
+        logger.warning(
+            "%s: %d of %d points dropped: their coordinates are not finite",
+            path,
+            int((~finite).sum()),
+            len(finite),
+        )
+    normals = None if content.normals is None else content.normals[finite]
+    if normals is not None and not np.isfinite(normals).all():
+        logger.warning("%s: normals left out: some are not finite", path)
+        normals = None
+    return PointCloud(content.vertices[finite], normals, int((~finite).sum()))
+
+
+def write_obj(
+    path: str | Path,
+    mesh: Mesh,
+    parameterization: Parameterization,
+    texture: npt.NDArray[np.uint8] | None = None,
+) -> None:
+    """Write a mesh and its map as OBJ: v, vt and f with both indices, exact to the last bit.
+
+    Args:
+        path: the OBJ file; it appears only when it is complete.
+        mesh: the mesh.
+        parameterization: its map.
+        texture: (H, W, 3) pixels, first row at the top. With it, a material beside the OBJ
+            (same name, .mtl) shows it (same name, .png).
+
+    Raises:
+        InputError: the map has another number of faces than the mesh, or the texture another shape.
+        OSError: a file cannot be written; nothing of the OBJ is left behind.
+    """
+    path = Path(path)
+    if len(mesh.faces) != len(parameterization.corners):
+        raise InputError(
+            f"{path}: a map of {len(parameterization.corners)} faces cannot be written "
+            f"with a mesh of {len(mesh.faces)}"
+        )
+    material = ""
+    if texture is not None:
+        image, library = path.with_suffix(".png"), path.with_suffix(".mtl")
+        pixels = png(texture)
+        with complete_file(image) as file:
+            file.write(pixels)
+        with complete_file(library) as file:
+            file.write(f"newmtl map\nKd 1 1 1\nmap_Kd {image.name}\n".encode())
+        material = f"mtllib {library.name}\nusemtl map\n"
+    corners = np.stack([mesh.faces, parameterization.corners], axis=2).reshape(-1, 6) + 1
+    lines = [
+        material,
+        *(f"v {x!r} {y!r} {z!r}\n" for x, y, z in mesh.vertices.tolist()),
+        *(f"vt {u!r} {v!r}\n" for u, v in parameterization.uv.tolist()),
+        *(f"f {a}/{ta} {b}/{tb} {c}/{tc}\n" for a, ta, b, tb, c, tc in corners.tolist()),
+    ]
+    with complete_file(path) as file:
+        file.write("".join(lines).encode())
+
+
+def write_points(path: str | Path, cloud: PointCloud, uv: FloatArray) -> None:
+    """Write points and their UV: .ply (properties u and v), .npz (points, uv) or .obj (v, vt).
+
+    Normals are carried where the cloud has them.
+
+    Raises:
+        InputError: another ending; `uv` is not finite or not (P, 2).
+        OSError: the file cannot be written; nothing is left behind.
+    """
+    path = Path(path)
+    uv = read_only(uv, np.float64, "uv", 2)
+    if len(uv) != len(cloud.points):
+        raise InputError(f"{path}: {len(uv)} uv for {len(cloud.points)} points")
+    arrays = {"points": cloud.points, "normals": cloud.normals, "uv": uv}
+    given = {name: values for name, values in arrays.items() if values is not None}
+    writers: dict[str, Callable[[IO[bytes], dict[str, FloatArray]], None]] = {
+        ".ply": _write_ply_points,
+        ".npz": lambda file, columns: np.savez_compressed(file, **columns),  # type: ignore[arg-type]  # its allow_pickle flag is no array
+        ".obj": _write_obj_points,
+    }
+    writer = writers.get(path.suffix.lower())
+    if writer is None:
+        raise InputError(f"{path}: points are written as {', '.join(writers)}")
+    with complete_file(path) as file:
+        writer(file, given)
+
+
+def _write_ply_points(file: IO[bytes], columns: dict[str, FloatArray]) -> None:
+    """Little-endian PLY with float64 properties."""
+    names = {"points": "x y z", "normals": "nx ny nz", "uv": "u v"}
+    properties = " ".join(names[name] for name in columns).split()
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        f"element vertex {len(columns['points'])}",
+        *(f"property double {name}" for name in properties),
+        "end_header\n",
+    ]
+    file.write("\n".join(header).encode())
+    for rows in _slices(len(columns["points"])):
+        part = [values[rows] for values in columns.values()]
+        file.write(np.concatenate(part, axis=1).astype("<f8").tobytes())
+
+
+def _write_obj_points(file: IO[bytes], columns: dict[str, FloatArray]) -> None:
+    """OBJ without faces: row k of v, vn and vt is point k."""
+    keys = {"points": "v", "normals": "vn", "uv": "vt"}
+    for name, values in columns.items():
+        for rows in _slices(len(values)):
+            lines = (" ".join(map(repr, row)) for row in values[rows].tolist())
+            file.write("".join(f"{keys[name]} {line}\n" for line in lines).encode())
+
+
+def _slices(count: int) -> Iterator[slice]:
+    """Rows written at a time."""
+    return (slice(k, k + ROWS_WRITTEN) for k in range(0, count, ROWS_WRITTEN))
+
+
+@contextmanager
+def complete_file(path: Path) -> Iterator[IO[bytes]]:
+    """A file to write, which takes its name only at the end: nobody ever sees half of it."""
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with unfinished.open("wb") as file:
+            yield file
+        unfinished.replace(path)
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+def png(pixels: npt.NDArray[np.uint8]) -> bytes:
+    """A PNG file of (H, W, 3) uint8 pixels.
+
+    Raises:
+        InputError: another shape or type.
+    """
+    if pixels.ndim != 3 or pixels.shape[2] != 3 or pixels.dtype != np.uint8 or pixels.size == 0:
+        raise InputError(
+            f"a texture must be (H, W, 3) uint8 pixels, not {pixels.shape} {pixels.dtype}"
+        )
+    height, width, _ = pixels.shape
+    rows = np.zeros((height, 1 + 3 * width), dtype=np.uint8)  # each row begins with filter 0
+    rows[:, 1:] = pixels.reshape(height, -1)
+
+    def chunk(kind: bytes, body: bytes) -> bytes:
+        crc = zlib.crc32(kind + body)
+        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", crc)
+
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)  # 8 bits of red, green, blue
+    return b"".join(
+        [
+            b"\x89PNG\r\n\x1a\n",
+            chunk(b"IHDR", header),
+            chunk(b"IDAT", zlib.compress(rows.tobytes())),
+            chunk(b"IEND", b""),
+        ]
+    )

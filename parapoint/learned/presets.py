@@ -1,0 +1,177 @@
+"""Presets: every number of the method, frozen. `paper` holds what the text fixes."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from dataclasses import dataclass
+from typing import Any, Self
+
+from parapoint.errors import InputError
+from parapoint.parameters import check_choice, check_number, check_whole
+from parapoint.surfaces.sampling import FEWEST_POINTS
+
+CHOICES = {
+    "activation": ("leaky_relu", "squareplus"),
+    "branches": ("both", "3d", "2d"),
+    "distortion": ("conformal", "isometric"),
+    "eigenvalues": ("singular", "gram"),
+    "precision": ("float32", "bfloat16"),
+}
+"""What each setting in words may say."""
+NUMBERS = (
+    "perturbation",
+    "unwrap_weight",
+    "wrap_weight",
+    "cycle_weight",
+    "distortion_weight",
+    "anti_flip_weight",
+    "unfolding_weight",
+    "unwrap_spacing",
+    "anti_flip_angle",
+    "learning_rate",
+    "final_learning_rate",
+    "weight_decay",
+)
+"""Settings that may be any number of at least 0."""
+
+
+@dataclass(frozen=True)
+class Preset:
+    """All numbers of a run.
+
+    The defaults are the paper's wherever it gives a number; those it leaves open say so.
+
+    Attributes:
+        hidden: hidden layer sizes of every stack.
+        embedding: d, channels of the embedding in Deform and Cut.
+        activation: "leaky_relu" (slope 0.01) or "squareplus" (width 0.2).
+        branches: "both", or one of the ablations "3d" (3D→2D→3D alone) and "2d".
+        points: training points.
+        iterations: steps, warm-up included (the text gives none; the group's later code 10,000).
+        subset: points that go through the networks in a step before `all_from`, drawn anew each
+            time (open: "a sparser subset"); the Chamfer distance is to all points throughout.
+        all_from: share of the run after which each step takes all points (open: "later").
+        warm_up: share of the run that goes to the points' convex hull (open).
+        perturbation: standard deviation of the noise on points, in mean distances between
+            neighbouring training points (open: "slightly").
+        unwrap_weight, wrap_weight, cycle_weight, distortion_weight, anti_flip_weight: weights.
+        unfolding_weight: of `losses.unfolding_loss` on the cloud's tangent planes; 0 in the paper,
+            which then does without normals.
+        distortion: "conformal" or "isometric".
+        eigenvalues: "singular" values of the Jacobian, or of its "gram" matrix (open).
+        unwrap_neighbours: K_u (open; the group's later code has 8).
+        unwrap_spacing: ε = spacing · L(Q) / √N.
+        anti_flip_neighbours: K of the anti-flip term.
+        anti_flip_angle: T_angle.
+        learning_rate, final_learning_rate: ends of the cosine (open; from the later code).
+        weight_decay: of AdamW (open; from the later code).
+        precision: "float32", or "bfloat16" for the wide products of training where the processor
+            has units for them (twice as fast; the gradient's direction stays, cosine 0.9995).
+    """
+
+    hidden: tuple[int, ...] = (64, 128, 512, 128)
+    embedding: int = 64
+    activation: str = "leaky_relu"
+    branches: str = "both"
+    points: int = 10_000
+    iterations: int = 10_000
+    subset: int = 2_048
+    all_from: float = 0.5
+    warm_up: float = 0.15
+    perturbation: float = 0.1
+    unwrap_weight: float = 0.01
+    wrap_weight: float = 1.0
+    cycle_weight: float = 0.01
+    distortion_weight: float = 0.01
+    anti_flip_weight: float = 0.01
+    unfolding_weight: float = 0.0
+    distortion: str = "conformal"
+    eigenvalues: str = "singular"
+    unwrap_neighbours: int = 8
+    unwrap_spacing: float = 0.1
+    anti_flip_neighbours: int = 4
+    anti_flip_angle: float = math.pi / 2
+    learning_rate: float = 1e-3
+    final_learning_rate: float = 1e-5
+    weight_decay: float = 1e-8
+    precision: str = "float32"
+
+    def __post_init__(self) -> None:
+        for name, least in (
+            ("points", FEWEST_POINTS),
+            ("subset", FEWEST_POINTS),
+            ("iterations", 1),
+        ):
+            check_whole(name, getattr(self, name), least)
+        for name in ("embedding", "unwrap_neighbours", "anti_flip_neighbours"):
+            check_whole(name, getattr(self, name), 1)
+        for size in self.hidden:
+            check_whole("a hidden layer's size", size, 1)
+        for name, choices in CHOICES.items():
+            check_choice(name, getattr(self, name), choices)
+        for name in ("all_from", "warm_up"):
+            check_number(name, getattr(self, name), most=1.0)
+        for name in NUMBERS:
+            check_number(name, getattr(self, name))
+
+    def facts(self) -> dict[str, Any]:
+        """All numbers, as JSON has them."""
+        return {**dataclasses.asdict(self), "hidden": list(self.hidden)}
+
+    @classmethod
+    def from_facts(cls, facts: dict[str, Any]) -> Self:
+        """The preset that `facts` returned.
+
+        Raises:
+            InputError: a number is not as said.
+            TypeError: there is no such number.
+        """
+        return cls(**{**facts, "hidden": tuple(facts["hidden"])})
+
+    def largest_layer(self) -> int:
+        """Weights, biases included, of the largest layer of the networks."""
+        sizes = [3 + self.embedding, *self.hidden, max(3, self.embedding)]
+        return max((a + 1) * b for a, b in itertools.pairwise(sizes))
+
+
+PAPER = Preset()
+"""The paper."""
+
+LEARNED = Preset(
+    hidden=(256, 256, 256),
+    activation="squareplus",
+    subset=512,
+    all_from=1.0,
+    iterations=3_000,
+    cycle_weight=0.1,
+    unfolding_weight=0.1,
+)
+"""Our training of the paper's networks. It departs from the text in a smooth activation (a
+piecewise linear network has a piecewise constant Jacobian), in layers of equal width, in a larger
+weight of the cycle, and in a conformal term on the tangent planes of the cloud, signed by normals
+that are oriented first, so that folds are pushed out. docs/METHOD.md has what each change was
+measured to bring."""
+
+PRESETS = {"paper": PAPER, "learned": LEARNED}
+
+RENAMED = {
+    "fast": "the computed map is a method of its own: ComputedMap in Python, `computed` elsewhere",
+    "computed": "it is a method of its own: ComputedMap in Python, `computed` elsewhere",
+    "smooth": 'it is called "learned" now',
+}
+"""Names that a preset does not have, and what to say of each."""
+
+
+def named(preset: str) -> Preset:
+    """The preset of that name.
+
+    Raises:
+        InputError: there is none.
+    """
+    if preset in RENAMED:
+        raise InputError(f"no preset {preset!r}: {RENAMED[preset]}")
+    if preset not in PRESETS:
+        raise InputError(f"no preset {preset!r}; there are: {', '.join(PRESETS)}")
+    return PRESETS[preset]

@@ -1,0 +1,440 @@
+"""Training: the hull warm-up, the schedule, the loop, divergence, the state that is saved."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from copy import deepcopy
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from scipy import sparse
+from scipy.sparse import csgraph
+from scipy.spatial import cKDTree
+from torch import Tensor
+
+from parapoint.learned import losses
+from parapoint.learned.networks import ACTIVATIONS, Cycle, Networks, SurfaceNetworks
+from parapoint.learned.presets import Preset
+from parapoint.surfaces.sampling import hull_sample, mean_spacing
+from parapoint.surfaces.surface import FloatArray
+
+SNAPSHOTS = 100
+"""States kept in a run, evenly: the last good one is where a diverged run begins again."""
+PRECISIONS = {"float32": torch.float32, "bfloat16": torch.bfloat16}
+"""What `Preset.precision` may name."""
+DIVERGED = 10.0
+"""A mean loss this many times the phase's lowest has diverged."""
+SMALLER_STEP = 0.3
+"""Factor on the learning rate after a divergence."""
+LARGEST_KEPT = 31 * 2**20
+"""Bytes of the largest block by whose release glibc learns to keep freed memory: under 32 MiB."""
+
+
+class DivergedError(RuntimeError):
+    """Training diverged twice, the second time with a smaller step, before any usable state."""
+
+
+class Step(NamedTuple):
+    """Where a run is.
+
+    Attributes:
+        iteration: steps done.
+        progress: share of the run that is done, in [0, 1].
+        seconds: time spent in training, earlier sessions of a resumed run included.
+        phase: "hull", "subset" or "all".
+        losses: at a snapshot, the mean of each unweighted term and of the weighted "total" since
+            the one before; empty at other steps.
+    """
+
+    iteration: int
+    progress: float
+    seconds: float
+    phase: str
+    losses: dict[str, float]
+
+
+class AdamW:
+    """Adam with decoupled weight decay (Loshchilov and Hutter 2019, algorithm 2).
+
+    The same as `torch.optim.AdamW` with its defaults, whose first use takes two seconds of imports.
+    """
+
+    def __init__(self, parameters: list[Tensor], weight_decay: float) -> None:
+        self.parameters, self.weight_decay = parameters, weight_decay
+        self.steps = [torch.zeros((), device=p.device) for p in parameters]
+        self.first = [torch.zeros_like(p) for p in parameters]
+        self.second = [torch.zeros_like(p) for p in parameters]
+
+    @torch.no_grad()
+    def step(self, learning_rate: float) -> None:
+        """Move the parameters that have a gradient, and drop the gradients."""
+        rows = [
+            (parameter, parameter.grad, *moments)
+            for parameter, *moments in zip(
+                self.parameters, self.first, self.second, self.steps, strict=True
+            )
+            if parameter.grad is not None
+        ]
+        parameters, gradients, first, second, steps = (list(of) for of in zip(*rows, strict=True))
+        torch._foreach_add_(steps, 1)
+        # The kernel that torch.optim calls.
+        torch._fused_adamw_(
+            parameters,
+            gradients,
+            first,
+            second,
+            [],
+            steps,
+            lr=learning_rate,
+            beta1=0.9,
+            beta2=0.999,
+            weight_decay=self.weight_decay,
+            eps=1e-8,
+            amsgrad=False,
+            maximize=False,
+        )
+        for parameter in parameters:
+            parameter.grad = None
+
+    def state(self) -> dict[str, Tensor]:
+        """The moments by name, not copied."""
+        moments = {"steps": self.steps, "first": self.first, "second": self.second}
+        return {f"{name}.{i}": t for name, of in moments.items() for i, t in enumerate(of)}
+
+    def restore(self, state: dict[str, Tensor]) -> None:
+        """Copy in what `state` returned."""
+        for name, tensor in self.state().items():
+            tensor.copy_(state[name])
+
+
+_FACTS = (
+    "iteration",
+    "seconds",
+    "divergences",
+    "_phase_now",
+    "_lowest",
+    "_next_snapshot",
+    "_sums",
+    "_count",
+)
+"""Attributes of a Trainer that a checkpoint keeps."""
+
+
+def _under(prefix: str, tensors: dict[str, Tensor]) -> dict[str, Tensor]:
+    """The tensors whose names begin with `prefix`, without it."""
+    return {name[len(prefix) :]: t for name, t in tensors.items() if name.startswith(prefix)}
+
+
+class Trainer:
+    """Fits the networks to one cloud. Another objective is a subclass with its own `terms`.
+
+    Args:
+        points: (N, 3) float32, centred, largest norm 1.
+        preset: every number of the run.
+        seed: of all random draws: initial weights, subsets, perturbations.
+        device: "cpu" or "cuda".
+        time_budget: seconds after which the run ends; the schedule follows the time where that
+            comes before the preset's number of iterations.
+        networks: what to train, all its parameters; new networks of the preset by default.
+
+    Attributes:
+        seconds: spent so far; what was spent before the run may be added, as part of the budget.
+    """
+
+    def __init__(
+        self,
+        points: FloatArray,
+        preset: Preset,
+        *,
+        seed: int,
+        device: str,
+        time_budget: float | None = None,
+        networks: SurfaceNetworks | None = None,
+    ) -> None:
+        keep_freed_memory()
+        self.preset, self.time_budget = preset, time_budget
+        self.generator = torch.Generator().manual_seed(seed)
+        if networks is None:
+            networks = Networks(
+                preset.hidden,
+                preset.embedding,
+                ACTIVATIONS[preset.activation],
+                self.generator,
+            )
+        self.networks = networks.to(device)
+        self.precision = usable_precision(preset.precision, device)
+        self.networks.train_in(PRECISIONS[self.precision])
+        self.optimizer = AdamW(list(self.networks.parameters()), preset.weight_decay)
+        self.device = device
+        self.shape = self.prepared(points)
+        self.hull = self.shape
+        if preset.warm_up:
+            self.hull = self.prepared(hull_sample(points, len(points), seed))
+        self.noise = preset.perturbation * mean_spacing(points)
+        self.iteration = 0
+        self.seconds = 0.0
+        self.divergences = 0
+        self._phase_now = ""
+        self._lowest = math.inf
+        self._next_snapshot = 1 / SNAPSHOTS
+        self._sums: dict[str, float] = {}
+        self._count = 0
+        self._good = deepcopy(self._state())
+
+    @property
+    def weights(self) -> dict[str, float]:
+        """The weight of each term of the objective."""
+        names = ("unwrap", "wrap", "cycle", "distortion", "anti_flip", "unfolding")
+        given = {name: float(getattr(self.preset, f"{name}_weight")) for name in names}
+        return {name: weight for name, weight in given.items() if weight or name != "unfolding"}
+
+    def prepared(self, points: FloatArray) -> Tensor:
+        """(1, N, 3) points, or (3, N, 3) with their tangent frames where a term asks for these."""
+        rows = points[None]
+        if self.preset.unfolding_weight:
+            rows = np.concatenate([rows, tangent_frames(points)])
+        return torch.as_tensor(rows, dtype=torch.float32, device=self.device)
+
+    def terms(self, points: Tensor, grid: Tensor, given: Tensor) -> dict[str, Tensor]:
+        """The unweighted terms of the objective at a batch.
+
+        Args:
+            points: rows of `prepared`, some of the N points.
+            grid: (M, 2) a lattice in [−1, 1]².
+            given: (N, 3) all points.
+        """
+        cycle = self.networks(
+            points if self.preset.branches != "2d" else None,
+            grid if self.preset.branches != "3d" else None,
+        )
+        return objective_terms(self.preset, cycle, given)
+
+    @property
+    def progress(self) -> float:
+        """Share of the run that is done, by iterations or by time, whichever is ahead."""
+        by_time = 0.0 if self.time_budget is None else self.seconds / self.time_budget
+        return min(1.0, max(self.iteration / self.preset.iterations, by_time))
+
+    def run(self) -> Iterator[Step]:
+        """Train to the end, a `Step` for each iteration; leave the networks at the best state.
+
+        Best: the lowest mean loss between two snapshots of the last phase (losses of different
+        phases do not compare: the Chamfer distance falls with the number of points).
+
+        Raises:
+            DivergedError: the loss blew up twice.
+        """
+        longest = 0.0
+        begin = time.perf_counter()
+        while self.progress < 1 and self._fits(longest):
+            phase = self._phase()
+            if phase != self._phase_now:
+                self._phase_now, self._lowest, longest = phase, math.inf, 0.0
+                self._sums, self._count = {}, 0
+            for name, value in self._step().items():
+                self._sums[name] = self._sums.get(name, 0.0) + value
+            self._count += 1
+            self.iteration += 1
+            now = time.perf_counter()
+            longest = max(longest, now - begin)
+            self.seconds += now - begin  # what is done between steps counts too
+            begin = now
+            means: dict[str, float] = {}
+            ends_phase = self.progress == 1 or self._phase() != phase
+            if ends_phase or self.progress >= self._next_snapshot:
+                means = {name: total / self._count for name, total in self._sums.items()}
+                self._snapshot(means["total"])
+            yield Step(self.iteration, self.progress, self.seconds, phase, means)
+        self._restore(self._good)
+
+    def tensors(self) -> dict[str, Tensor]:
+        """What a checkpoint holds as tensors: this state, the last good one, the generator."""
+        kept = {"now": self._state(), "good": self._good}
+        return {
+            "generator": self.generator.get_state(),
+            **{f"{key}.{name}": t for key, state in kept.items() for name, t in state.items()},
+        }
+
+    def facts(self) -> dict[str, Any]:
+        """What a checkpoint holds as JSON."""
+        return {name: getattr(self, name) for name in _FACTS}
+
+    def resume(self, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:
+        """Go on from what `tensors` and `facts` returned in an earlier process."""
+        self.generator.set_state(tensors["generator"])
+        self._restore(_under("now.", tensors))
+        self._good = _under("good.", tensors)
+        for name in _FACTS:
+            setattr(self, name, facts[name])
+
+    def _state(self) -> dict[str, Tensor]:
+        """Weights and optimiser state by name, not copied."""
+        kept = {"networks": self.networks.state_dict(), "optimizer": self.optimizer.state()}
+        return {f"{key}.{name}": t for key, state in kept.items() for name, t in state.items()}
+
+    def _restore(self, state: dict[str, Tensor]) -> None:
+        """Load a copy of what `_state` returned."""
+        self.networks.load_state_dict(_under("networks.", state))
+        self.optimizer.restore(_under("optimizer.", state))
+
+    def _snapshot(self, total: float) -> None:
+        """Keep the state if its mean loss is the phase's lowest; go back to it if it diverged.
+
+        A loss that merely rises is let rise: the run ends with the best state anyhow.
+        """
+        self._next_snapshot = self.progress + 1 / SNAPSHOTS
+        self._sums, self._count = {}, 0
+        if math.isfinite(total) and total <= DIVERGED * self._lowest:
+            if total < self._lowest:
+                self._lowest = total
+                self._good = deepcopy(self._state())
+            return
+        self.divergences += 1
+        self._restore(self._good)
+        if self.divergences > 1:
+            raise DivergedError("training diverged twice, the second time with a smaller step")
+
+    def _fits(self, seconds: float) -> bool:
+        """Whether a step of this length still ends within the time budget."""
+        return self.time_budget is None or self.seconds + seconds <= self.time_budget
+
+    def _phase(self) -> str:
+        if self.progress < self.preset.warm_up:
+            return "hull"
+        return "subset" if self.progress < self.preset.all_from else "all"
+
+    def _step(self) -> dict[str, float]:
+        """One iteration: its unweighted terms and the weighted total."""
+        try:
+            terms = self.terms(*self._batch(), self._cloud()[0])
+        except losses.NotFiniteError:
+            return {"total": math.nan}
+        total = torch.stack([self.weights[name] * value for name, value in terms.items()]).sum()
+        if total.requires_grad:  # anchored networks train nothing in the point branch
+            total.backward()  # type: ignore[no-untyped-call]
+            self.optimizer.step(self._learning_rate())
+        return {name: value.item() for name, value in {**terms, "total": total}.items()}
+
+    def _learning_rate(self) -> float:
+        first, last = self.preset.learning_rate, self.preset.final_learning_rate
+        cosine = (1 + math.cos(math.pi * self.progress)) / 2
+        return (last + (first - last) * cosine) * SMALLER_STEP**self.divergences
+
+    def _batch(self) -> tuple[Tensor, Tensor]:
+        """Perturbed points of the phase (see `prepared`) and a perturbed lattice (about n, 2)."""
+        cloud = self._cloud()
+        size = cloud.shape[1]
+        if self._phase() != "all" and self.preset.subset < size:
+            size = self.preset.subset
+            chosen = torch.randperm(cloud.shape[1], generator=self.generator)[:size]
+            cloud = cloud[:, chosen.to(self.device)]
+        noise = torch.zeros(cloud.shape)
+        noise[0] = self.noise * torch.randn(size, 3, generator=self.generator)
+        grid = lattice(round(math.sqrt(size)), self.generator)
+        return cloud + noise.to(self.device), grid.to(self.device)
+
+    def _cloud(self) -> Tensor:
+        """All points that the phase is fitted to (see `prepared`)."""
+        return self.hull if self._phase() == "hull" else self.shape
+
+
+def objective_terms(preset: Preset, cycle: Cycle, points: Tensor) -> dict[str, Tensor]:
+    """The unweighted terms of the objective; those of a branch that is left out are missing.
+
+    Args:
+        preset: weights and settings.
+        cycle: both branches.
+        points: (N, 3) all given points. P̂ is held against these also where a sparse subset goes
+            through the networks: against the subset alone the Chamfer distance is mostly sampling
+            noise, in which the terms of weight 0.01 drown.
+    """
+    distortion = losses.DISTORTIONS[preset.distortion]
+    eigenvalues = losses.EIGENVALUES[preset.eigenvalues]
+    terms: dict[str, Tensor] = {}
+    cycle_terms, tangents_at = [], []
+    if cycle.point is not None:
+        there = cycle.point
+        terms["unwrap"] = losses.unwrap_loss(
+            there.uv, preset.unwrap_neighbours, preset.unwrap_spacing
+        )
+        cycle_terms += [(there.points, there.points_cycle), (there.cut, there.cut_cycle)]
+        tangents_at.append((there.points_cycle, there.tangents))
+        if len(there.unfolding):
+            terms["unfolding"] = losses.unfolding_loss(there.unfolding)
+    if cycle.grid is not None:
+        back = cycle.grid
+        terms["wrap"] = losses.wrap_loss(back.points, points)
+        cycle_terms += [(back.uv, back.uv_cycle), (back.cut, back.cut_cycle)]
+        tangents_at.append((back.points, back.tangents))
+    K, T = preset.anti_flip_neighbours, preset.anti_flip_angle
+    return {
+        **terms,
+        "cycle": _sum([losses.cycle_loss(*pair) for pair in cycle_terms]),
+        "distortion": _sum([distortion(*eigenvalues(J)) for _, J in tangents_at]),
+        "anti_flip": _sum([losses.anti_flip_loss(p, J, K, T) for p, J in tangents_at]),
+    }
+
+
+def _sum(terms: list[Tensor]) -> Tensor:
+    return torch.stack(terms).sum()
+
+
+def keep_freed_memory() -> None:
+    """Let glibc keep up to 62 MiB of freed memory, so that a step finds that of the step before.
+
+    Twice the largest block that was ever freed is kept (mallopt(3), M_MMAP_THRESHOLD). What is over
+    goes back to the system, and comes again by page faults: 6 % of a step of 256 points. The block
+    is never written, so it takes no memory; other C libraries see a block come and go.
+    """
+    torch.empty(LARGEST_KEPT, dtype=torch.uint8)
+
+
+def usable_precision(wanted: str, device: str) -> str:
+    """The precision wanted, or "float32" where the device has no units for it."""
+    if device == "cuda":
+        is_fast = torch.cuda.is_bf16_supported()
+    else:
+        is_fast = torch.cpu._is_amx_tile_supported()  # noqa: SLF001 (there is no public name)
+    return wanted if is_fast else "float32"
+
+
+def lattice(side: int, generator: torch.Generator) -> Tensor:
+    """(side², 2) a lattice of cells in [−1, 1]², one point in each, anywhere in it."""
+    cells = torch.cartesian_prod(torch.arange(side), torch.arange(side))
+    return (cells + torch.rand(side * side, 2, generator=generator)) * (2 / side) - 1
+
+
+def oriented_normals(points: FloatArray, neighbours: int = 12) -> FloatArray:
+    """(N, 3) unit normals, oriented alike along a spanning tree (Hoppe et al. 1992).
+
+    Least principal directions of the nearest neighbours; the tree prefers parallel ones.
+    """
+    near = cKDTree(points).query(points, min(neighbours, len(points)))[1]
+    offsets = points[near] - points[near].mean(axis=1, keepdims=True)
+    normals = np.linalg.eigh(np.einsum("nki,nkj->nij", offsets, offsets))[1][:, :, 0]
+    rows = np.repeat(np.arange(len(points)), near.shape[1] - 1)
+    columns = near[:, 1:].ravel()
+    apart = 1.0 + 1e-6 - np.abs((normals[rows] * normals[columns]).sum(axis=1))
+    size = (len(points), len(points))
+    tree = csgraph.minimum_spanning_tree(sparse.coo_matrix((apart, (rows, columns)), size).tocsr())
+    waiting = np.ones(len(points), dtype=bool)
+    while waiting.any():
+        root = int(np.argmax(waiting))
+        order, parents = csgraph.breadth_first_order(tree, root, directed=False)
+        waiting[order] = False
+        for child in order[1:]:
+            if normals[child] @ normals[parents[child]] < 0:
+                normals[child] *= -1
+    return np.asarray(normals)
+
+
+def tangent_frames(points: FloatArray) -> FloatArray:
+    """(2, N, 3) orthonormal tangent vectors, right-handed around the oriented normals."""
+    normals = oriented_normals(points)
+    least = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    first = np.cross(normals, least)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(normals, first)])

@@ -1,0 +1,59 @@
+"""The components of meshes and clouds."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+from scipy.spatial import cKDTree
+
+from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, PointCloud, Surface
+
+NEIGHBOURS = 8
+"""Points joined to each point of a cloud. It needs no length, so uneven density is no matter; and
+more than so many points that are nearer to each other than to all others stand apart."""
+FEWEST = 100
+"""Points of a component of a cloud; smaller ones go with the nearest that is larger."""
+SAMPLE = 200_000
+"""Most points of a cloud among which components are looked for; the others go with the nearest."""
+
+
+def components(surface: Surface) -> list[Surface]:
+    """The components of a surface, largest first (a mesh's by area, a cloud's by points).
+
+    Of a mesh: faces that share vertices, left out where they have no area. Of a cloud: connected
+    components of the graph that joins each point to its NEIGHBOURS nearest.
+    """
+    if isinstance(surface, Mesh):
+        label = surface.face_components
+        area = np.bincount(label, weights=surface.face_areas)
+        order = [k for k in np.argsort(-area, kind="stable") if area[k] > 0]
+        return [_submesh(surface, label == k) for k in order] or [surface]
+    label = cloud_labels(surface.points)
+    by_size = np.argsort(-np.bincount(label), kind="stable")
+    normals = surface.normals
+    return [
+        PointCloud(surface.points[label == k], None if normals is None else normals[label == k])
+        for k in by_size
+    ]
+
+
+def cloud_labels(points: FloatArray) -> IntArray:
+    """(N,) the component, from 0, of each of (N, 3) points; see `components`."""
+    size = min(len(points), SAMPLE)
+    sample = np.unique(points[np.random.default_rng(0).permutation(len(points))[:size]], axis=0)
+    near = cKDTree(sample).query(sample, min(NEIGHBOURS + 1, len(sample)))[1][:, 1:]
+    rows = np.repeat(np.arange(len(sample)), near.shape[1])
+    graph = sparse.coo_matrix((np.ones(len(rows), bool), (rows, near.ravel())), [len(sample)] * 2)
+    label = csgraph.connected_components(graph, directed=False)[1]
+    large = np.bincount(label)[label] >= FEWEST
+    if not large.any():
+        return np.zeros(len(points), dtype=np.int64)
+    nearest = cKDTree(sample[large]).query(points)[1]
+    return np.unique(label[large][nearest], return_inverse=True)[1].astype(np.int64)
+
+
+def _submesh(mesh: Mesh, chosen: np.ndarray) -> Mesh:
+    """These faces (F,) and their vertices."""
+    used, faces = np.unique(mesh.faces[chosen], return_inverse=True)
+    return Mesh(mesh.vertices[used], faces.reshape(-1, 3))

@@ -1,0 +1,141 @@
+"""Parameterizations: what a method returns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from parapoint.errors import InputError
+from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, edge_table, read_only
+
+
+class TracePoint(NamedTuple):
+    """The state of an iterative method after `iteration` steps, for convergence curves.
+
+    Attributes:
+        iteration: steps done.
+        seconds: time since the method began.
+        values: energy or loss terms by name.
+        uv: (T, 2) the map at this step, rows as in the result, or None where it was not kept.
+    """
+
+    iteration: int
+    seconds: float
+    values: Mapping[str, float]
+    uv: FloatArray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Parameterization:
+    """A map of a mesh to the plane, one uv for each face corner, indexed as in an OBJ file.
+
+    Attributes:
+        uv: (T, 2) float64 coordinates, finite.
+        corners: (F, 3) int64: corner k of face f lies at `uv[corners[f, k]]`. Faces are in the
+            order of the mesh. A seam is where the two faces at an edge use different rows.
+        trace: states on the way there, if the method keeps them.
+        report: what the method wants written beside its result (energies, iterations, weights).
+
+    Raises:
+        InputError: a shape, a value or an index is not as said.
+    """
+
+    uv: FloatArray
+    corners: IntArray
+    trace: tuple[TracePoint, ...] = ()
+    report: Mapping[str, object] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        uv = read_only(self.uv, np.float64, "uv", 2)
+        corners = read_only(self.corners, np.int64, "corners", 3)
+        if len(corners) and (corners.min() < 0 or corners.max() >= len(uv)):
+            raise InputError(f"corners must be rows of uv, which run from 0 to {len(uv) - 1}")
+        object.__setattr__(self, "uv", uv)
+        object.__setattr__(self, "corners", corners)
+
+    @cached_property
+    def _edge_table(self) -> tuple[IntArray, IntArray, IntArray]:
+        """UV edges (E, 2), the edge of each halfedge (3F,), halfedges at each edge (E,)."""
+        return edge_table(self.corners)
+
+    @property
+    def edges(self) -> IntArray:
+        """(E, 2) undirected UV edges: pairs of rows of `uv`, smaller row first."""
+        return self._edge_table[0]
+
+    @property
+    def edge_of_halfedge(self) -> IntArray:
+        """(3F,) row of `edges` for each halfedge, ordered as `Mesh.halfedges`."""
+        return self._edge_table[1]
+
+    @property
+    def edge_face_count(self) -> IntArray:
+        """(E,) number of faces at each UV edge: 1 on the boundary of a chart, 2 inside."""
+        return self._edge_table[2]
+
+    @cached_property
+    def _charts(self) -> IntArray:
+        face = np.repeat(np.arange(len(self.corners)), 3)
+        # Faces and their edges as one graph: a path between two faces runs through shared edges.
+        size = len(self.corners) + len(self.edges)
+        graph = sparse.coo_matrix(
+            (np.ones(len(face), dtype=bool), (face, len(self.corners) + self.edge_of_halfedge)),
+            shape=(size, size),
+        )
+        label = csgraph.connected_components(graph, directed=False)[1][: len(self.corners)]
+        return np.asarray(label, dtype=np.int64)
+
+    def charts(self) -> IntArray:
+        """(F,) the chart of each face: faces that share a UV edge (two rows of `uv`) are in one.
+
+        Charts are numbered from 0 in the order of their first faces.
+        """
+        return self._charts
+
+    def seams(self, mesh: Mesh) -> IntArray:
+        """(S, 2) interior edges of `mesh` along which the map is cut, smaller vertex first.
+
+        An edge with two faces is a seam unless both use the same two rows of `uv` there.
+
+        Raises:
+            InputError: the mesh has another number of faces.
+        """
+        if len(mesh.faces) != len(self.corners):
+            raise InputError(
+                f"{len(self.corners)} corner rows for a mesh of {len(mesh.faces)} faces"
+            )
+        start = self.corners.reshape(-1)
+        end = np.roll(self.corners, -1, axis=1).reshape(-1)
+        forward = mesh.halfedges[:, 0] <= mesh.halfedges[:, 1]
+        ends = np.where(forward[:, None], np.stack([start, end], 1), np.stack([end, start], 1))
+        order = np.argsort(mesh.edge_of_halfedge, kind="stable")
+        first = order[np.cumsum(mesh.edge_face_count) - mesh.edge_face_count]
+        differs = (ends != ends[first[mesh.edge_of_halfedge]]).any(axis=1)
+        return np.asarray(mesh.edges[np.unique(mesh.edge_of_halfedge[differs])], dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class PointParameterization:
+    """A map of a point cloud to the plane.
+
+    Attributes:
+        uv: (P, 2) float64 coordinates, finite, one row a point.
+        trace: states on the way there, if the method keeps them.
+        report: what the method wants written beside its result.
+
+    Raises:
+        InputError: a shape or a value is not as said.
+    """
+
+    uv: FloatArray
+    trace: tuple[TracePoint, ...] = ()
+    report: Mapping[str, object] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "uv", read_only(self.uv, np.float64, "uv", 2))

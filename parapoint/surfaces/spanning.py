@@ -1,0 +1,230 @@
+"""The faces that span a learned seam: laid to one bank of it, or cut along a path of edges."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import igl
+import numpy as np
+from scipy.sparse import csgraph
+
+from parapoint.surfaces.cutting import disk_cut, edge_graph, edge_lengths, edge_mask, path_to
+from parapoint.surfaces.parameterization import Parameterization
+from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
+
+Transform = Callable[[FloatArray], FloatArray]
+"""A map of points (N, 3) to the plane (N, 2)."""
+
+LENGTH = 0.01
+"""Shortest spanning edge, in sides of the map's square box: T_cut of the paper."""
+STRETCH = 5.0
+"""How many times more than the edges around either end a spanning edge is stretched."""
+MOST_PIECES = 2_000_000
+"""Pieces that all edges together are divided into at most, besides one of each."""
+IN_BAND = 0.1
+"""Cost of a cut among the faces that span the seam, as a fraction of its cost elsewhere."""
+SHORTEST_BRANCH = 4
+"""Edges of the shortest branch of a seam that is followed."""
+ROUNDS = 5
+"""How often the vertices of flipped faces are placed anew."""
+
+
+def spanning_edges(
+    mesh: Mesh,
+    uv: FloatArray,
+    transform: Transform | None = None,
+    spacing: float = math.inf,
+) -> BoolArray:
+    """(E,) the edges of `mesh` that a map with one uv (V, 2) for each vertex draws across its seam.
+
+    They are longer in the plane than T_cut, and at both ends stretched STRETCH times as much as
+    the lower quartile of the edges there, so that one calm bank tells.
+
+    Of an edge that is long beside the seam's own width the ends tell little: it may reach around a
+    limb and end near where it began. With the map as a function all this holds of the pieces of
+    the edges, and an edge spans the seam where one of its pieces does.
+
+    Args:
+        mesh: the surface.
+        uv: the images of its vertices.
+        transform: the whole map, of which `uv` are values.
+        spacing: length of the longest piece of an edge, about that between fitted points; pieces
+            are longer where there would be too many.
+    """
+    start, end = mesh.edges.T
+    real = np.linalg.norm(mesh.vertices[end] - mesh.vertices[start], axis=1)
+    longest = max(spacing, real.sum() / MOST_PIECES) if transform else math.inf
+    count = np.maximum(np.ceil(real / longest), 1).astype(np.int64)
+    edge = np.repeat(np.arange(len(count)), count)
+    length = _piece_lengths(mesh, uv, transform, count)
+    stretch = length / np.maximum(real / count, 1e-12 * max(real.max(), 1e-300))[edge]
+    vertex = np.concatenate([start[edge], end[edge]])
+    order = np.lexsort((np.tile(stretch, 2), vertex))
+    degree = np.bincount(vertex, minlength=len(mesh.vertices))
+    first = np.cumsum(degree) - degree
+    quartile = np.zeros(len(degree))
+    used = degree > 0
+    quartile[used] = np.tile(stretch, 2)[order][(first + degree // 4)[used]]
+    box = np.ptp(uv[mesh.referenced], axis=0).max()
+    calm = np.minimum(quartile[start], quartile[end])[edge]
+    spans = (length > LENGTH * box) & (stretch > STRETCH * calm)
+    return np.asarray(np.bincount(edge, spans, len(count)) > 0)
+
+
+def _piece_lengths(
+    mesh: Mesh, uv: FloatArray, transform: Transform | None, count: IntArray
+) -> FloatArray:
+    """(Σ count,) lengths in the plane of the pieces of the edges, `count` (E,) of each."""
+    if transform is None or (count == 1).all():
+        start, end = mesh.edges.T
+        return np.asarray(np.linalg.norm(uv[end] - uv[start], axis=1))
+    edge = np.repeat(np.arange(len(count)), count + 1)
+    place = np.arange(len(edge)) - np.repeat(np.cumsum(count + 1) - count - 1, count + 1)
+    share = (place / count[edge])[:, None]
+    start, end = (mesh.vertices[ends] for ends in mesh.edges[edge].T)
+    images = transform((1 - share) * start + share * end)
+    steps = np.linalg.norm(np.diff(images, axis=0), axis=1)
+    return np.asarray(steps[edge[1:] == edge[:-1]])
+
+
+def spanning_faces(mesh: Mesh, uv: FloatArray) -> BoolArray:
+    """(F,) the faces with an edge that spans the seam of a map with one uv (V, 2) a vertex."""
+    spans = spanning_edges(mesh, uv)[mesh.edge_of_halfedge]
+    return np.asarray(spans.reshape(-1, 3).any(axis=1))
+
+
+def learned_seam(mesh: Mesh, uv: FloatArray) -> BoolArray:
+    """(E,) a clean cut along the seam that a map with one uv (V, 2) for each vertex tears at.
+
+    The spanning faces form a band along the seam, where edges are cheap to cut. A closed surface
+    or one with handles is opened by the cheapest cut to a disk (a sphere along the longest path in
+    the band); then one branch after another is led from the cut or the boundary to what is left
+    farthest of the band. Branches only start where it is open already, so that the surface stays in
+    one piece and, once it is a disk, a disk.
+
+    Args:
+        mesh: connected, manifold, consistently oriented.
+        uv: (V, 2) the map.
+    """
+    band = np.zeros(len(mesh.edges), dtype=bool)
+    band[mesh.edge_of_halfedge.reshape(-1, 3)[spanning_faces(mesh, uv)]] = True
+    lengths = edge_lengths(mesh)
+    cost = np.where(band, IN_BAND, 1.0) * lengths
+    inner = mesh.edge_face_count == 2
+    cut = ~inner
+    if mesh.genus > 0:
+        cut = cut | disk_cut(mesh, cost)
+    elif not cut.any():
+        cut = _longest_path(mesh, cost, band) if band.any() else disk_cut(mesh)
+    ends = np.unique(mesh.edges[band])
+    graph = edge_graph(mesh, cost)
+    while len(ends):
+        distance, previous, _ = csgraph.dijkstra(
+            graph, indices=np.unique(mesh.edges[cut]), return_predecessors=True, min_only=True
+        )
+        tip = int(ends[distance[ends].argmax()])
+        if distance[tip] < SHORTEST_BRANCH * IN_BAND * lengths.mean():
+            break
+        path = path_to(previous, tip)
+        cut = cut | edge_mask(mesh, np.stack([path[:-1], path[1:]], axis=1))
+    return np.asarray(cut & inner)
+
+
+def _longest_path(mesh: Mesh, cost: FloatArray, band: BoolArray) -> BoolArray:
+    """(E,) a path between two far vertices of the largest part of the band (E,)."""
+    graph = edge_graph(mesh, np.where(band, cost, 0.0))
+    _, label = csgraph.connected_components(graph, directed=False)
+    end = int((label == np.bincount(label).argmax()).argmax())
+    for _ in range(2):  # the farthest of the farthest
+        distance, previous = csgraph.dijkstra(graph, indices=end, return_predecessors=True)
+        end = int(np.where(np.isfinite(distance), distance, -1).argmax())
+    path = path_to(previous, end)
+    if len(path) < 3:  # one edge opens nothing
+        return disk_cut(mesh)
+    return edge_mask(mesh, np.stack([path[:-1], path[1:]], axis=1))
+
+
+def unfolded(mesh: Mesh, uv: FloatArray, disk: Mesh) -> FloatArray:
+    """(V', 2) the map with every vertex of the cut mesh on its own bank of the seam.
+
+    Vertices of faces that do not span keep their uv. All others, which lie at the far bank or on
+    neither, and those of faces that are flipped, are placed where the map is most nearly conformal.
+
+    Args:
+        mesh: the surface.
+        uv: (V, 2) its map.
+        disk: the mesh cut along `learned_seam`, without unreferenced vertices.
+
+    Raises:
+        RuntimeError: the linear system is singular.
+    """
+    origin = np.empty(len(disk.vertices), dtype=np.int64)
+    origin[disk.faces] = mesh.faces
+    sound = ~spanning_faces(mesh, uv)
+    images = uv[origin]
+    if _doubled_areas(images[disk.faces[sound]]).sum() < 0:
+        images = images * [1.0, -1.0]
+    known = np.zeros(len(origin), dtype=bool)
+    known[disk.faces[sound]] = True
+    placed = images
+    for _ in range(ROUNDS):
+        rows = np.flatnonzero(known)
+        if len(rows) < 2:
+            break
+        placed = igl.lscm(disk.vertices, disk.faces, rows, np.ascontiguousarray(images[rows]))[0]
+        flipped = _doubled_areas(placed[disk.faces]) <= 0
+        if not flipped.any():
+            break
+        known[disk.faces[flipped]] = False
+    return np.asarray(placed)
+
+
+def opened(mesh: Mesh, uv: FloatArray, spans: BoolArray) -> Parameterization:
+    """The map of a mesh by one uv (V, 2) for each vertex, cut where edges span the learned seam.
+
+    A face with one edge that does not span stays at that edge's bank: its third corner gets a uv
+    of its own, where the face has its true shape. A face of three spanning edges becomes a chart
+    of its own, in its true shape, beside its first corner.
+
+    Args:
+        mesh: the surface.
+        uv: the images of its vertices.
+        spans: (E,) whether an edge spans the seam (see `spanning_edges`).
+    """
+    spans = spans[mesh.edge_of_halfedge].reshape(-1, 3)
+    rows = [uv]
+    corners: IntArray = mesh.faces.copy()
+    count = len(uv)
+    sound = ~spans.any(axis=1)
+    doubled = _doubled_areas(uv[mesh.faces[sound]])
+    mirror = 1.0 if doubled.sum() >= 0 else -1.0
+    real = mesh.face_areas[sound].sum()
+    scale = float(np.sqrt(np.abs(doubled).sum() / 2 / real)) if real > 0 else 1.0
+    for face in np.flatnonzero(~sound):
+        kept = int(np.argmin(spans[face]))
+        at = [kept, (kept + 1) % 3, (kept + 2) % 3]
+        a, b, c = mesh.vertices[mesh.faces[face, at]]
+        base, side = b - a, c - a
+        squared = float(base @ base)
+        if squared == 0:
+            continue
+        along = float(side @ base) / squared
+        across = mirror * float(np.linalg.norm(np.cross(base, side))) / squared
+        start = uv[mesh.faces[face, at[0]]]
+        edge = uv[mesh.faces[face, at[1]]] - start
+        if spans[face].all():
+            edge = np.array([scale * np.sqrt(squared), 0.0])
+            rows += [start[None], (start + edge)[None]]
+            corners[face, at[:2]] = count, count + 1
+            count += 2
+        rows.append((start + along * edge + across * np.array([-edge[1], edge[0]]))[None])
+        corners[face, at[2]] = count
+        count += 1
+    return Parameterization(np.concatenate(rows), corners)
+
+
+def _doubled_areas(images: FloatArray) -> FloatArray:
+    """(F,) twice the signed areas of triangles (F, 3, 2)."""
+    first, second = images[:, 1] - images[:, 0], images[:, 2] - images[:, 0]
+    return np.asarray(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])

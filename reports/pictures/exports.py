@@ -1,0 +1,108 @@
+"""Textured exports: every map on its mesh as OBJ + MTL + PNG and as GLB, for other programs."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import trimesh
+from PIL import Image
+
+from benchmarks.store.results import ResultRow
+from parapoint.errors import InputError
+from parapoint.files.surfaces import complete_file, write_obj
+from parapoint.sources import source_hash
+from parapoint.surfaces.parameterization import Parameterization
+from parapoint.surfaces.surface import Mesh
+from parapoint.textures.checkerboard import checkerboard
+from reports.contents import Contents
+from reports.pictures.drawing import known_keys, slug
+
+KINDS = ("obj", "glb")
+
+
+def _stem(report: Path, row: ResultRow) -> Path:
+    name = f"{slug(row.method)}.{row.id[:8]}"
+    return report / "exports" / slug(row.suite) / slug(row.case) / name
+
+
+def written(report: Path, row: ResultRow) -> dict[str, str]:
+    """Addresses of the exports of a cell that lie in the report, by their names."""
+    stem = _stem(report, row)
+    paths = {kind.upper(): stem.with_name(f"{stem.name}.{kind}") for kind in KINDS}
+    return {
+        name: path.relative_to(report).as_posix() for name, path in paths.items() if path.exists()
+    }
+
+
+def write(contents: Contents, report: Path) -> list[str]:
+    """Write the exports of the suite that are not there yet; what could not be, and why."""
+    record = report / "exports" / slug(contents.suite) / "keys.json"
+    record.parent.mkdir(parents=True, exist_ok=True)
+    known = known_keys(record)
+    source = source_hash(__name__)
+    keys, faults = {}, []
+    for row in contents.rows:
+        if row.status != "ok":
+            continue
+        text = f"{source} {row.surface_hash} {row.uv_sha256}"
+        key = hashlib.sha256(text.encode()).hexdigest()[:16]
+        if known.get(row.id) != key or len(written(report, row)) < len(KINDS):
+            try:
+                surface, result = contents.store.surface(row), contents.store.result(row)
+            except InputError as error:
+                faults.append(f"{row.case}, {row.method}: no export: {error}")
+                continue
+            if not isinstance(surface, Mesh) or not isinstance(result, Parameterization):
+                continue  # a cloud has no faces for a texture
+            textured(_stem(report, row), surface, result)
+        keys[row.id] = key
+    record.write_text(json.dumps(keys, indent=0, sort_keys=True) + "\n")
+    return faults
+
+
+def textured(stem: Path, mesh: Mesh, parameterization: Parameterization) -> None:
+    """Write `stem`.obj (with .mtl and .png) and `stem`.glb: the mesh under a checkerboard.
+
+    The map is as it was measured, moved and scaled into the unit square, so that the same board
+    fits all methods.
+
+    Raises:
+        InputError: the map is not one of this mesh.
+    """
+    stem.parent.mkdir(parents=True, exist_ok=True)
+    uv = parameterization.uv
+    used = uv[np.unique(parameterization.corners)]
+    side = float(np.ptp(used, axis=0).max()) or 1.0
+    fitted = Parameterization((uv - used.min(axis=0)) / side, parameterization.corners)
+    texture = checkerboard()
+    write_obj(stem.with_name(f"{stem.name}.obj"), mesh, fitted, texture)
+    with complete_file(stem.with_name(f"{stem.name}.glb")) as file:
+        file.write(glb(mesh, fitted, texture))
+
+
+def glb(mesh: Mesh, parameterization: Parameterization, texture: npt.NDArray[np.uint8]) -> bytes:
+    """A binary glTF file of the mesh, its vertices split where the map is cut."""
+    pairs, corners = np.unique(
+        np.stack([mesh.faces.reshape(-1), parameterization.corners.reshape(-1)], axis=1),
+        axis=0,
+        return_inverse=True,
+    )
+    made: Any = trimesh.visual  # which has no types
+    material = made.material.PBRMaterial(
+        baseColorTexture=Image.fromarray(texture),
+        metallicFactor=0.0,
+        roughnessFactor=0.9,
+        doubleSided=True,
+    )
+    visual = made.TextureVisuals(parameterization.uv[pairs[:, 1]], material=material)
+    shape = trimesh.Trimesh(
+        mesh.vertices[pairs[:, 0]], corners.reshape(-1, 3), visual=visual, process=False
+    )
+    content = shape.export(file_type="glb")
+    assert isinstance(content, bytes)
+    return content

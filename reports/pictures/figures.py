@@ -1,0 +1,374 @@
+"""The figures of a report, each a function of the results: as PDF and PNG, with a caption.
+
+All draw from the store and from the pictures of `reports.pictures.drawing`; one style, colours that
+the colour-blind tell apart, and never colour alone.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+from collections.abc import Callable, Container, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+from typing import IO
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from PIL import Image as Images
+from pypdf import PdfWriter
+
+from benchmarks.store.results import ResultRow
+from parapoint.sources import source_hash
+from reports.contents import SHEETS, Contents
+from reports.pictures.clouds import DENSE, SPARSE
+from reports.pictures.drawing import known_keys, slug
+from reports.pictures.galleries import (
+    ablation,
+    ablation_of_the_paper,
+    clouds,
+    cut_model,
+    disks,
+    heat_maps,
+    is_cut,
+    maps,
+    models,
+)
+from reports.pictures.plots import (
+    area_convergence,
+    convergence,
+    cost,
+    losses,
+    pareto,
+    singular_values,
+)
+from reports.pictures.style import STYLE
+from reports.tables.published import published_values
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure to be made.
+
+    Attributes:
+        name: of its files.
+        title: one line.
+        caption: what it shows and how to read it.
+        rows: what it is drawn from.
+        figure: makes it; None where there is nothing to show.
+    """
+
+    name: str
+    title: str
+    caption: str
+    rows: tuple[ResultRow, ...]
+    figure: Callable[[], Figure | None]
+
+
+JPEG_QUALITY = 85
+"""Of pictures in a PDF."""
+
+MODELS, ROWS, PANELS = 12, 7, 9
+"""Models on a page of models, of rows of pictures, of plots."""
+
+
+def paged(
+    contents: Contents,
+    name: str,
+    title: str,
+    caption: str,
+    *,
+    make: Callable[[Sequence[str]], Figure | None],
+    cases: Sequence[str],
+    size: int,
+    methods: Container[str] | None = None,
+) -> list[Drawing]:
+    """A figure of `cases`, or several of `size` of them each: none is longer than a page.
+
+    It shows maps of `methods`, or of all; a model's first row stands for the model itself.
+    """
+    first = {row.case: row for row in reversed(contents.rows)}
+    first |= {row.case: row for row in reversed(contents.rows) if row.surface_hash}
+    parts = [cases[at : at + size] for at in range(0, len(cases), size)]
+    return [
+        Drawing(
+            f"{name}-{number}" if number > 1 else name,
+            f"{title}, {number} of {len(parts)}" if len(parts) > 1 else title,
+            caption,
+            tuple(
+                row
+                for row in contents.rows
+                if row.case in part
+                and (methods is None or row.method in methods or row == first[row.case])
+            ),
+            partial(make, part),
+        )
+        for number, part in enumerate(parts, start=1)
+    ]
+
+
+def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
+    """All figures of a suite, the ones to look at first first."""
+    checker = (
+        "The checkerboard's fields have the same size in UV for all methods, whose UV area is "
+        "scaled to that of the surface. Green: seams, and faces that span a learned seam; orange: "
+        "flipped faces. UV layouts are coloured by the surface's normals, so that its parts can "
+        "be told; faces that span a learned seam are left pale there and lie below the others."
+    )
+    cases = contents.cases
+    meshes = [case for case in cases if case not in contents.clouds]
+    whole = [case for case in meshes if not is_cut(contents, case)]
+    several = partial(paged, contents)
+    sheets = [] if contents.is_large else cases
+    told = [case for case in cases if case in sheets or published_values(case)]
+    as_points = [case for case in cases if case in told or case in contents.clouds]
+
+    found = [
+        *several(
+            "models",
+            "Test models",
+            "The models from two sides, meshes with their edges.",
+            make=partial(models, contents, pictures),
+            cases=cases,
+            size=MODELS,
+            methods=(),
+        ),
+        *several(
+            "disks",
+            "SLIM and ParaPoint on the disks",
+            f"The supplement's figure: the models that need no cut. {checker}",
+            make=partial(disks, contents, pictures),
+            cases=whole,
+            size=ROWS,
+            methods=("slim", "parapoint"),
+        ),
+        *several(
+            "clouds",
+            "ParaPoint from points",
+            f"The paper's figure. (a) {SPARSE:,} points, as ParaPoint gets them, coloured by the "
+            "true normals, which it does not get. (b) Their uv, in the same colours. (c) The "
+            f"checkerboard on {DENSE:,} points. (d) Green: points of the faces that span a learned "
+            "seam. The uv of a point is interpolated in its face, or is that of the nearest corner "
+            "where the face spans a seam: the results hold no network that could be asked. Of a "
+            f"report of more than {SHEETS} models, those of the paper are shown. Where "
+            "the model is a cloud itself, (c) shows its own points as disks, and (d) those where "
+            "the map tears between neighbours.",
+            make=partial(clouds, contents, pictures),
+            cases=as_points,
+            size=ROWS,
+            methods=("parapoint",),
+        ),
+    ]
+    if len(contents.methods) > 1 and len({label.method for label in contents.methods}) == 1:
+        found += [
+            *several(
+                "ablation",
+                f"Ablation of {contents.methods[0].name}",
+                f"One change at a time: UV layout above, texture below. {checker}",
+                make=partial(ablation, contents, pictures),
+                cases=cases,
+                size=3,
+            ),
+            Drawing(
+                "ablation-paper",
+                "The paper's ablation",
+                "(a) The cube under the conformal and (b) under the isometric term; (c) the eight "
+                "with the 2D→3D→2D branch alone and (d) with the 3D→2D→3D branch alone. UV layout "
+                f"above, texture below. {checker}",
+                contents.rows,
+                partial(ablation_of_the_paper, contents, pictures),
+            ),
+        ]
+    for case in told:
+        rows = tuple(row for row in contents.rows if row.case == case)
+        if is_cut(contents, case) or contents.has_artist(case):
+            found.append(
+                Drawing(
+                    f"cut-{slug(case)}",
+                    f"{case}: hand-made, automatic and learned cut",
+                    "The model; the artist's own map, where the file has one (the hand-made cut of "
+                    "the paper's nefertiti is not public); SLIM on the automatic cut, the same for "
+                    f"every method that needs one; ParaPoint with the seam it learned. {checker}",
+                    rows,
+                    partial(cut_model, contents, case, pictures),
+                )
+            )
+    found += [
+        *several(
+            "pareto",
+            "Angles against areas",
+            "Angle difference (over all faces) against area discrepancy; the grey steps join what "
+            "no other method with one chart beats in both (hollow: many charts). A map may buy the "
+            "one with the other.",
+            make=partial(pareto, contents),
+            cases=cases,
+            size=PANELS,
+        ),
+        *several(
+            "convergence",
+            "Angle distortion against time",
+            "Angle difference over all faces along the way of every method that keeps a trace; a "
+            "single marker is a method without one, at its end.",
+            make=partial(convergence, contents),
+            cases=cases,
+            size=PANELS,
+        ),
+        *several(
+            "convergence-area",
+            "Area distortion against time",
+            "Area discrepancy over all faces along the way, as in the figure of the angles.",
+            make=partial(area_convergence, contents),
+            cases=cases,
+            size=PANELS,
+        ),
+        *several(
+            "losses",
+            "Losses of ParaPoint",
+            "Loss terms of ParaPoint, each without its weight, and their weighted total, against "
+            "iterations: means since the point before.",
+            make=partial(losses, contents),
+            cases=cases,
+            size=PANELS,
+            methods=("parapoint",),
+        ),
+        *several(
+            "singular-values",
+            "Singular values",
+            "How the surface's area is distributed over the singular values of the map, UV area "
+            "scaled to the surface's, faces that span a learned seam left out: the larger filled, "
+            "the smaller as a line, heights relative to the higher peak of each row. An isometry "
+            "is one peak at 1; a conformal map moves both together.",
+            make=partial(singular_values, contents),
+            cases=meshes,
+            size=PANELS,
+        ),
+        Drawing(
+            "cost",
+            "Time against size",
+            "Wall time of each method against the number of faces, model by model; the lines are "
+            "the power laws that fit it best.",
+            contents.rows,
+            partial(cost, contents),
+        ),
+    ]
+    for case in sheets:
+        rows = tuple(row for row in contents.rows if row.case == case)
+        if not any(row.status == "ok" for row in rows):
+            continue
+        found.append(
+            Drawing(
+                f"maps-{slug(case)}",
+                f"{case}: all methods",
+                f"All methods on {case}. {checker}",
+                rows,
+                partial(maps, contents, case, pictures),
+            )
+        )
+        if case in meshes:
+            found.append(
+                Drawing(
+                    f"heat-{slug(case)}",
+                    f"{case}: where the distortion is",
+                    f"Distortion of the angles (stretch, the ratio of the singular values) and of "
+                    f"the areas on {case}, on the surface and in UV, faces that span a learned "
+                    "seam left out (grey on the surface).",
+                    rows,
+                    partial(heat_maps, contents, case, pictures),
+                )
+            )
+    return found
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A figure that lies in the folder."""
+
+    name: str
+    title: str
+    caption: str
+
+
+def draw(contents: Contents, pictures: Path, folder: Path, jobs: int) -> list[Drawn]:
+    """Write the figures of a suite into `folder` as PDF and PNG, those that have changed.
+
+    `captions.md` beside them says what each shows; `jobs` processes share the work.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    record = folder / "keys.json"
+    known = known_keys(record)
+    source = source_hash(__name__)
+    keys, changed = {}, []
+    planned = drawings(contents, pictures)
+    for drawing in planned:
+        states = [[row.id, row.status, row.uv_sha256, row.seconds] for row in drawing.rows]
+        text = f"{source} {contents.is_large} {json.dumps(states)}"
+        keys[drawing.name] = hashlib.sha256(text.encode()).hexdigest()[:16]
+        if known.get(drawing.name) != keys[drawing.name]:
+            changed.append(drawing)
+    make = partial(write, folder, contents.is_large)
+    if jobs > 1 and len(changed) > 1:
+        with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+            list(pool.map(make, changed))
+    else:
+        for drawing in changed:
+            make(drawing)
+    record.write_text(json.dumps(keys, indent=0, sort_keys=True) + "\n")
+    for name in known.keys() - keys.keys():  # of a folder that grew
+        for kind in ("pdf", "png"):
+            (folder / f"{name}.{kind}").unlink(missing_ok=True)
+    drawn = [
+        Drawn(one.name, one.title, one.caption)
+        for one in planned
+        if (folder / f"{one.name}.png").exists()
+    ]
+    captions = [f"## {one.name}\n\n**{one.title}.** {one.caption}\n" for one in drawn]
+    (folder / "captions.md").write_text("\n".join(captions), encoding="utf-8")
+    return drawn
+
+
+def write(folder: Path, coarse: bool, drawing: Drawing) -> None:
+    """Write a figure as PDF and PNG; the same figure gives the same bytes.
+
+    Sheets of many pictures, and all figures if `coarse`, are not as fine: they are most of the
+    weight. So are colours beyond 256, which no eye misses.
+    """
+    files = [folder / f"{drawing.name}.{kind}" for kind in ("pdf", "png")]
+    sheet = coarse or drawing.name.startswith(("maps-", "heat-"))
+    with mpl.rc_context(STYLE | {"savefig.dpi": STYLE["savefig.dpi"] * (0.7 if sheet else 1.0)}):
+        made = drawing.figure()
+        if made is None:
+            for file in files:
+                file.unlink(missing_ok=True)
+            return
+        content = io.BytesIO()
+        made.savefig(content, format="png")
+        with Images.open(content) as image:
+            whole = image.convert("RGB")
+            colours = whole.quantize(256, method=Images.Quantize.FASTOCTREE)
+            levels = colours.getpalette() or []
+            colours.putpalette([255 if level > 247 else level for level in levels])  # white paper
+            few = whole.quantize(palette=colours, dither=Images.Dither.FLOYDSTEINBERG)
+            few.save(files[1], optimize=True, dpi=image.info["dpi"])
+        pictures = made.findobj(AxesImage)
+        for shown in pictures:
+            shown.set_interpolation("none")  # as it is, at the size it is printed
+        content = io.BytesIO()
+        made.savefig(content, format="pdf", metadata={"CreationDate": None, "Title": drawing.title})
+        files[0].write_bytes(light(content) if pictures else content.getvalue())
+
+
+def light(document: IO[bytes]) -> bytes:
+    """A PDF with its pictures as JPEG, which matplotlib cannot write: a fourth of the bytes."""
+    made = PdfWriter(clone_from=document)
+    for page in made.pages:
+        for picture in page.images:
+            if picture.image is not None:
+                picture.replace(picture.image, quality=JPEG_QUALITY, optimize=True)
+    content = io.BytesIO()
+    made.write(content)
+    return content.getvalue()

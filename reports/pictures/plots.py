@@ -1,0 +1,272 @@
+"""The figures that are plots: distortion against distortion, time and size; losses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from benchmarks.metrics.distortion import (
+    angle_difference_mean,
+    area_discrepancy_total,
+    face_distortion,
+    triangles,
+)
+from benchmarks.store.results import ResultRow
+from parapoint.errors import InputError
+from parapoint.surfaces.parameterization import Parameterization
+from parapoint.surfaces.surface import FloatArray
+from reports.contents import ANGLE, AREA, Contents, Label
+from reports.pictures.drawing import Map
+from reports.pictures.galleries import leading
+from reports.pictures.style import (
+    COLOURS,
+    DASHES,
+    legend_below,
+    look,
+    plain_log,
+    small_multiples,
+    wrapped,
+)
+
+
+def losses(contents: Contents, cases: Sequence[str]) -> Figure | None:
+    """Loss terms of ParaPoint against iterations, model by model."""
+    label = leading(contents, "parapoint")
+    traces = {}
+    for case in cases:
+        row = contents.shown(case, label) if label else None
+        found = trace_of(contents, row) if row else pd.DataFrame()
+        if len(found) > 1:
+            traces[case] = found
+    if not traces:
+        return None
+    made, places = small_multiples(len(traces))
+    names = list(dict.fromkeys(name for found in traces.values() for name in found.columns))
+    names = [name for name in names if name not in {"iteration", "seconds"}]
+    for place, (case, found) in zip(places, traces.items(), strict=True):
+        for number, name in enumerate(names):
+            if name in found and (found[name] > 0).any():
+                known = found[found[name] > 0]
+                total = name in {"total", "loss"}
+                place.plot(
+                    known["iteration"],
+                    known[name],
+                    label=name.replace("_", " "),
+                    color="0.1" if total else COLOURS[number % len(COLOURS)],
+                    linestyle="-" if total else DASHES[number % len(DASHES)],
+                    linewidth=1.6 if total else 1.1,
+                )
+        place.set_yscale("log")
+        place.set_title(case)
+        place.set_xlabel("iteration")
+    places[0].set_ylabel("loss term")
+    legend_below(made, places)
+    return made
+
+
+def trace_of(contents: Contents, row: ResultRow) -> pd.DataFrame:
+    """The trace of a cell as a table: iteration, seconds, values by name; empty without one."""
+    try:
+        result = contents.store.result(row)
+    except InputError:
+        return pd.DataFrame()
+    return pd.DataFrame(
+        [
+            {"iteration": iteration, "seconds": seconds, **values}
+            for iteration, seconds, values, _ in result.trace
+        ]
+    )
+
+
+def quality_trace(contents: Contents, row: ResultRow) -> pd.DataFrame:
+    """Angle and area distortion over all faces along the way, where the maps were kept."""
+    mapped = contents.mapped(row)
+    if mapped is None:
+        return pd.DataFrame()
+    surface, result = mapped
+    records = []
+    for at in result.trace:
+        if at.uv is not None and len(at.uv) == len(result.uv):
+            faces = triangles(surface, Parameterization(at.uv, result.corners))
+            found = face_distortion(faces)
+            records.append(
+                {
+                    "seconds": at.seconds,
+                    "angle": angle_difference_mean(found),
+                    "area": area_discrepancy_total(found),
+                }
+            )
+    return pd.DataFrame(records)
+
+
+def convergence(contents: Contents, cases: Sequence[str]) -> Figure | None:
+    """Angle distortion against time for every method with a trace; others as a single point."""
+    return _convergence(contents, cases, "angle", ANGLE, "angle difference [rad]")
+
+
+def area_convergence(contents: Contents, cases: Sequence[str]) -> Figure | None:
+    """Area distortion against time, likewise."""
+    return _convergence(contents, cases, "area", AREA, "area discrepancy")
+
+
+def _convergence(
+    contents: Contents, cases: Sequence[str], name: str, metric: str, title: str
+) -> Figure | None:
+    curves: dict[str, list[tuple[Label, pd.DataFrame]]] = {}
+    traced = False
+    for case in cases:
+        for label in contents.methods:
+            row = contents.shown(case, label)
+            if row is None or row.seconds is None:
+                continue
+            found = quality_trace(contents, row)
+            traced |= len(found) > 1
+            if len(found) < 2:
+                value = contents.measured.loc[contents.measured["id"] == row.id, metric]
+                found = pd.DataFrame({"seconds": [row.seconds], name: [float(value.iloc[0])]})
+            known = found[np.isfinite(found[name]) & (found["seconds"] > 0)]
+            if len(known):  # a map of points has neither angles nor areas of faces
+                curves.setdefault(case, []).append((label, known))
+    if not traced:
+        return None
+    made, places = small_multiples(len(curves))
+    for place, (case, lines) in zip(places, curves.items(), strict=True):
+        for label, known in lines:
+            place.plot(
+                known["seconds"], known[name], label=label.short, markersize=3.5,
+                **look(contents, label),
+            )  # fmt: skip
+        place.set_xscale("log")
+        plain_log(place.xaxis)
+        if name == "angle":
+            place.set_yscale("log")
+            plain_log(place.yaxis)
+        place.set_title(case)
+        place.set_xlabel("seconds")
+    places[0].set_ylabel(title)
+    legend_below(made, places)
+    return made
+
+
+def pareto(contents: Contents, cases: Sequence[str]) -> Figure | None:
+    """Angle against area distortion, model by model: nearer to the lower left is better."""
+    good = contents.means[contents.means["ok"] > 0]
+    good = good[np.isfinite(good[ANGLE]) & np.isfinite(good[AREA])]
+    cases = [case for case in cases if (good["case"] == case).any()]
+    if not cases:
+        return None
+    made, places = small_multiples(len(cases))
+    for place, case in zip(places, cases, strict=True):
+        own = good[good["case"] == case].set_index("label")
+        for label in contents.methods:
+            if label.short in own.index:
+                record = own.loc[label.short]
+                style = look(contents, label) | {"linestyle": "none"}
+                style["markersize"] = 10 if style["marker"] == "*" else 6.5
+                if label.short in contents.atlases:
+                    style |= {"markerfacecolor": "none", "markeredgecolor": style["color"]}
+                else:
+                    style |= {"markeredgecolor": "white", "markeredgewidth": 0.5}
+                at = [max(float(record[AREA]), 1e-4)], [max(float(record[ANGLE]), 1e-6)]
+                place.plot(*at, label=label.short, **style)
+        own = own[~own.index.isin(contents.atlases)]
+        points = own[[AREA, ANGLE]].clip(lower=[1e-4, 1e-6]).sort_values(AREA).to_numpy(dtype=float)
+        best = np.minimum.accumulate(points[:, 1])
+        place.step(points[:, 0], best, where="post", color="0.6", linewidth=0.8, zorder=1)
+        place.set_yscale("log")
+        plain_log(place.yaxis)
+        right = place.get_xlim()[1]
+        place.set_xlim(-0.04 * right, 1.04 * right)  # no marker is cut at either end
+        place.set_title(case)
+        place.set_xlabel("area discrepancy")
+    places[0].set_ylabel("angle difference [rad]")
+    legend_below(made, places)
+    return made
+
+
+def singular_values(contents: Contents, cases: Sequence[str]) -> Figure | None:
+    """How much of the surface is stretched by how much: both singular values, method by method."""
+    cases = [case for case in cases if any(contents.shown(case, m) for m in contents.methods)]
+    if not cases:
+        return None
+    labels = contents.methods
+    tall = 0.33 * len(labels) + 0.8
+    made, places = small_multiples(len(cases), tall, left=0.21, bottom=0.5)
+    bins = np.linspace(-5, 5, 81)
+    middle = (bins[1:] + bins[:-1]) / 2
+    for number, (place, case) in enumerate(zip(places, cases, strict=True)):
+        for line, label in enumerate(labels):
+            row = contents.shown(case, label)
+            sigmas = singular_value_shares(contents, row, bins) if row else None
+            y = len(labels) - 1 - line
+            if sigmas is None:
+                place.text(-4.8, y + 0.1, "no map", fontsize=6.5, color="0.5")
+                continue
+            larger, smaller = 0.85 * sigmas / sigmas.max()
+            colour = look(contents, label)["color"]
+            place.fill_between(middle, y, y + larger, step="mid", color=colour, alpha=0.4, lw=0)
+            place.step(middle, y + smaller, where="mid", color=colour, linewidth=0.9)
+        place.axvline(0, color="0.5", linewidth=0.6)
+        place.set_xlim(-5, 5)
+        place.set_ylim(-0.1, len(labels))
+        place.set_xticks([-5, -2, 0, 2, 5], ["≤1/32", "1/4", "1", "4", "≥32"])
+        names = [wrapped(label.short, 25) for label in labels][::-1]
+        shown = names if number % 3 == 0 else [""] * len(names)
+        middles = np.arange(len(labels)) + 0.3
+        place.set_yticks(middles, shown, fontsize=6.5, linespacing=0.85)
+        place.grid(visible=False, axis="y")
+        place.tick_params(axis="y", length=0)
+        place.set_title(case)
+        place.set_xlabel(r"$\sigma_1$ (filled), $\sigma_2$ (line)")
+    return made
+
+
+def singular_value_shares(
+    contents: Contents, row: ResultRow, bins: FloatArray
+) -> FloatArray | None:
+    """(2, n) shares of the area by log2 of each singular value; None without a map of the mesh."""
+    mapped = contents.mapped(row)
+    if mapped is None:
+        return None
+    found = Map(*mapped).distortion
+    shares = []
+    for sigma in (found.sigma1, found.sigma2):
+        known = found.finite & (sigma > 0)
+        at = np.clip(np.log2(sigma[known]), bins[0], bins[-1])
+        shares.append(np.histogram(at, bins, weights=found.area[known])[0])
+    made = np.array(shares)
+    return made if made.max() > 0 else None
+
+
+def cost(contents: Contents) -> Figure | None:
+    """Time against the number of faces for every method, and the power law that fits it."""
+    surfaces = {case: contents.mesh(case) for case in contents.cases}
+    sizes = {case: len(mesh.faces) for case, mesh in surfaces.items() if mesh is not None}
+    if len(set(sizes.values())) < 2:
+        return None
+    made, places = small_multiples(1, height=3.0)
+    place = places[0]
+    for label in contents.methods:
+        rows = [contents.shown(case, label) for case in sizes]
+        points = [(sizes[row.case], row.seconds) for row in rows if row and row.seconds]
+        if not points:
+            continue
+        style = look(contents, label)
+        faces, seconds = np.array(points, dtype=np.float64).T
+        place.plot(faces, seconds, markersize=3.5, alpha=0.5, **(style | {"linestyle": "none"}))
+        ends = np.array([faces.min(), faces.max()])
+        # With two sizes or fewer there is nothing to fit: the line joins them.
+        power = np.polyfit(np.log(faces), np.log(seconds), min(1, len(np.unique(faces)) - 1))
+        line = np.exp(np.polyval(power, np.log(ends)))
+        place.plot(ends, line, label=label.short, markersize=4, markevery=[], **style)
+    place.set_xscale("log")
+    place.set_yscale("log")
+    plain_log(place.xaxis)
+    plain_log(place.yaxis)
+    place.set_xlabel("faces")
+    place.set_ylabel("seconds")
+    legend_below(made, places)
+    return made

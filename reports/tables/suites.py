@@ -1,0 +1,397 @@
+"""The tables of a suite: what each says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from parapoint.surfaces.preparation import CUT
+from reports.contents import (
+    ANGLE,
+    AREA,
+    FLIPPED,
+    POINT_ANGLE,
+    POINT_AREA,
+    POINT_COLLISIONS,
+    POINT_TEARS,
+    SPANNING,
+    Contents,
+    number,
+)
+from reports.tables.notes import environment_note, failure_notes, legend, method_notes
+from reports.tables.published import AUTHORS, Verdict, claim_text, published_values, verdicts
+from reports.tables.studies import (
+    ablation,
+    cuts,
+    means_by_kind,
+    paired_tests,
+    seed_variance,
+    success,
+)
+from reports.tables.table import Column, Table, Value, metric_column, metric_title
+
+SUMMARY_METRICS = (
+    ANGLE,
+    f"{ANGLE}_without_spanning",
+    "quasi_conformal_mean",
+    AREA,
+    f"{AREA}_without_spanning",
+    "area_log_ratio_mean",
+    "symmetric_dirichlet",
+    FLIPPED,
+    "overlapped_fraction",
+    SPANNING,
+    "seam_length",
+    POINT_ANGLE,
+    POINT_AREA,
+    POINT_COLLISIONS,
+    POINT_TEARS,
+    "seconds",
+)
+"""The metrics of the printed comparison; its CSV has them all."""
+
+
+def conformality(contents: Contents) -> Table | None:
+    """The supplement's table: models × methods, published figures in columns of their own.
+
+    None where all models are clouds, which have no triangles.
+    """
+    if contents.clouds.issuperset(contents.cases):
+        return None
+    columns = [Column("case", "Model", text=True)]
+    columns += [
+        Column(label.short, label.short, better="lower", digits=4, group="Measured here")
+        for label in contents.methods
+    ]
+    authors = [
+        author
+        for author in AUTHORS
+        if any(author in published_values(case) for case in contents.cases)
+    ]
+    columns += [
+        Column(f"published {author}", author, digits=3, group="Published, other files")
+        for author in authors
+    ]
+    if authors:
+        columns.append(Column("claim", "Our file is", text=True))
+    rows: list[dict[str, Value]] = []
+    for case in contents.cases:
+        row: dict[str, Value] = {"case": case, "claim": claim_text(case)}
+        for label in contents.methods:
+            record = contents.records.get((case, label.short))
+            value = number(record, ANGLE)
+            status = str(record["status"]).replace("_", " ") if record else ""
+            row[label.short] = value if value is not None else (status if status != "ok" else "")
+        for author, value in published_values(case).items():
+            row[f"published {author}"] = value
+        rows.append(row)
+    return Table(
+        name="conformality",
+        title="Conformality",
+        caption=(
+            "Conformality: mean absolute difference between the angles of the 3D and of the UV "
+            "triangles, radians, over all corners, unweighted; lower is better, best in bold, "
+            "second underlined. Alone it rewards maps that shrink most of the surface to nothing: "
+            "read it with the area distortion and the flips of the full table."
+        ),
+        columns=tuple(columns),
+        blocks=(tuple(rows),),
+        across=True,
+        set_apart=contents.atlases,
+        notes=(
+            legend(contents),
+            *method_notes(contents),
+            *_published_notes(authors),
+            environment_note(contents),
+        ),
+    )
+
+
+def _published_notes(authors: Sequence[str]) -> list[str]:
+    if not authors:
+        return []
+    return [
+        (
+            "Published figures are those of the ParaPoint supplement (SLIM, ParaPoint) and of FAM, "
+            "NeurIPS 2024 (FAM), on files that are not public; they are never ranked with ours."
+        )
+    ]
+
+
+def supplement(contents: Contents) -> Table | None:
+    """Each mesh's methods with angle distortion, area distortion, flips and spanning faces."""
+    meshes = [case for case in contents.cases if case not in contents.clouds]
+    if not meshes:
+        return None
+    judged: dict[tuple[str, str], Verdict] = {
+        (verdict.case, verdict.label.short): verdict for verdict in verdicts(contents)
+    }
+    without = f"{ANGLE}_without_spanning"
+    area_without = f"{AREA}_without_spanning"
+    columns = [
+        Column("case", "Model", text=True, once=True),
+        Column("method", "Method", text=True),
+        metric_column(ANGLE, "all faces", group="Angle difference [rad]"),
+        metric_column(without, "no spanning", group="Angle difference [rad]"),
+        metric_column(AREA, "all faces", group="Area discrepancy [0–2]"),
+        metric_column(area_without, "no spanning", group="Area discrepancy [0–2]"),
+        metric_column(FLIPPED, "flipped %"),
+        Column(SPANNING, "spanning %", digits=2, percent=True),
+        Column("chart_count", "charts", digits=0),
+        Column("seam_length", "seam", digits=2),
+        metric_column("seconds"),
+        Column("done", "ok", text=True),
+    ]
+    authors = [
+        author
+        for author in AUTHORS
+        if any(author in published_values(case) for case in contents.cases)
+    ]
+    columns += [
+        Column(f"published {author}", author, once=True, group="Published, other files")
+        for author in authors
+    ]
+    if authors:
+        columns.append(Column("verdict", "Against published", text=True))
+    blocks = []
+    for case in meshes:
+        rows: list[dict[str, Value]] = []
+        for label in contents.methods:
+            record = contents.records.get((case, label.short))
+            if record is None:
+                continue
+            cut = " + automatic cut" if CUT in str(record["preprocessing"]) else ""
+            row: dict[str, Value] = {
+                "case": f"{case} ({claim_text(case)})" if authors else case,
+                "method": label.text + cut,
+                **{
+                    name: number(record, name)
+                    for name in (ANGLE, without, AREA, area_without, FLIPPED)
+                },
+                "label": label.short,
+                **{name: number(record, name) for name in (SPANNING, "chart_count", "seam_length")},
+                "seconds": number(record, "seconds"),
+                "done": f"{record['ok']}/{record['tried']}" if record["tried"] else "skipped",
+            }
+            if record["status"] != "ok":
+                row["done"] = str(record["status"]).replace("_", " ")
+            for author, value in published_values(case).items():
+                row[f"published {author}"] = value
+            verdict = judged.get((case, label.short))
+            row["verdict"] = verdict.text if verdict else ""
+            rows.append(row)
+        blocks.append(tuple(rows))
+    return Table(
+        name="supplement",
+        title="Angle and area distortion, model by model",
+        caption=(
+            "Per model: the paper's conformality over all faces, as published, and without the "
+            "faces that span a learned seam; the same for the area discrepancy (0 for an "
+            "equal-area map, at most 2); flipped and seam-spanning faces; charts; length of the "
+            "seams over the root of "
+            "the surface's area; time; runs that ended well of those tried."
+        ),
+        columns=tuple(columns),
+        blocks=tuple(blocks),
+        set_apart=contents.atlases,
+        notes=(
+            *method_notes(contents),
+            *_published_notes(authors),
+            *failure_notes(contents),
+            environment_note(contents),
+        ),
+    )
+
+
+def comparison(contents: Contents, names: Sequence[str] = ()) -> Table:
+    """Methods × metrics: mean, median and worst over each method's own models, and common means.
+
+    `names` are the metrics: SUMMARY_METRICS unless given. The common mean is over the models on
+    which every method that ever succeeded did, so that nobody gains by failing.
+    """
+    means = contents.means
+    good = means[means["ok"] > 0]
+    able = [label for label in contents.methods if (good["label"] == label.short).any()]
+    common = [
+        case
+        for case in contents.cases
+        if all(((good["case"] == case) & (good["label"] == label.short)).any() for label in able)
+    ]
+    blocks = []
+    for name in names or SUMMARY_METRICS:
+        if name not in means.columns or not good[name].notna().any():
+            continue
+        rows: list[dict[str, Value]] = []
+        column = metric_column(name)
+        for label in contents.methods:
+            own = good[good["label"] == label.short]
+            values = own[name].dropna()
+            shared = own[own["case"].isin(common)][name].dropna()
+            tried = means[means["label"] == label.short]
+            worst = values.max() if column.better != "higher" else values.min()
+            rows.append(
+                {
+                    "metric": metric_title(name),
+                    "method": label.short,
+                    "label": label.short,
+                    **_scaled(column, "mean", values.mean() if len(values) else None),
+                    **_scaled(column, "median", values.median() if len(values) else None),
+                    **_scaled(column, "worst", worst if len(values) else None),
+                    **_scaled(column, "common", shared.mean() if len(shared) else None),
+                    "count": f"{len(values)}/{int((tried['tried'] > 0).sum())}",
+                    "skipped": float((tried["skipped"] > 0).sum()),
+                    "better": column.better,
+                }
+            )
+        blocks.append(tuple(rows))
+    shown = f"{len(common)}: {', '.join(common)}" if 0 < len(common) <= 12 else str(len(common))
+    return Table(
+        name="comparison",
+        title="All methods over all models",
+        caption=(
+            "Each metric over the models: mean, median and worst over those on which the method "
+            "ended well (their count beside it, of those tried), and the mean over the models on "
+            f"which all methods did ({shown})."
+        ),
+        columns=(
+            Column("metric", "Metric", text=True, once=True),
+            Column("method", "Method", text=True),
+            Column("mean", "mean", better="lower", digits=4),
+            Column("median", "median", better="lower", digits=4),
+            Column("worst", "worst", better="lower", digits=4),
+            Column("common", "common mean", better="lower", digits=4),
+            Column("count", "ok / tried", text=True),
+            Column("skipped", "skipped", digits=0),
+        ),
+        blocks=tuple(blocks),
+        set_apart=contents.atlases,
+        notes=(
+            *method_notes(contents),
+            *failure_notes(contents),
+            environment_note(contents),
+        ),
+    )
+
+
+def _scaled(column: Column, key: str, value: float | None) -> dict[str, Value]:
+    return {key: 100 * float(value) if column.percent and value is not None else value}
+
+
+def against_published(contents: Contents) -> Table | None:
+    """Measured against published numbers with claim, tolerance and verdict; None without any."""
+    judged = verdicts(contents)
+    if not judged:
+        return None
+    blocks: dict[str, list[Mapping[str, Value]]] = {}
+    for verdict in judged:
+        blocks.setdefault(verdict.case, []).append(
+            {
+                "case": f"{verdict.case} (paper: {verdict.paper_name})",
+                "claim": claim_text(verdict.case),
+                "method": verdict.label.text,
+                "measured": verdict.measured,
+                "published": verdict.published,
+                "difference": verdict.measured - verdict.published,
+                "tolerance": verdict.tolerance,
+                "verdict": verdict.text,
+            }
+        )
+    return Table(
+        name="published",
+        title="Published against measured",
+        caption=(
+            "Conformality measured here against the figure that was published for the method. A "
+            "verdict is given only where our file is, or likely is, the authors' own model."
+        ),
+        columns=(
+            Column("case", "Model", text=True, once=True),
+            Column("claim", "Our file is", text=True, once=True),
+            Column("method", "Method", text=True),
+            Column("measured", "measured", digits=4),
+            Column("published", "published"),
+            Column("difference", "difference"),
+            Column("tolerance", "tolerance"),
+            Column("verdict", "Verdict", text=True),
+        ),
+        blocks=tuple(tuple(rows) for rows in blocks.values()),
+        notes=(environment_note(contents),),
+    )
+
+
+def failures(contents: Contents) -> Table | None:
+    """Every cell that did not end well, with its reason; None where all did."""
+    rows = [
+        {
+            "case": row.case,
+            "method": contents.labels[row.id].text,
+            "seed": float(row.seed),
+            "status": row.status.replace("_", " "),
+            "reason": row.reason or "no reason given",
+            "seconds": row.seconds,
+        }
+        for row in contents.rows
+        if row.status != "ok"
+    ]
+    if not rows:
+        return None
+    return Table(
+        name="failures",
+        title="Cells that did not end well",
+        caption="Skipped: the method says beforehand that it cannot take the surface.",
+        columns=(
+            Column("case", "Model", text=True),
+            Column("method", "Method", text=True),
+            Column("seed", "seed", digits=0),
+            Column("status", "status", text=True),
+            Column("reason", "reason", text=True),
+            Column("seconds", "time [s]", digits=1),
+        ),
+        blocks=(tuple(rows),),
+    )
+
+
+def everything(contents: Contents) -> Table:
+    """One row a cell with every metric: the CSV for other programs."""
+    names = ["seconds", *contents.metrics]
+    by_id = contents.measured.set_index("id").to_dict("index")
+    rows = tuple(
+        {
+            "case": row.case,
+            "method": contents.labels[row.id].text,
+            "seed": float(row.seed),
+            "status": row.status,
+            **{name: number({str(k): v for k, v in by_id[row.id].items()}, name) for name in names},
+        }
+        for row in contents.rows
+    )
+    return Table(
+        name="cells",
+        title="Every cell",
+        caption="Every metric of every cell.",
+        columns=(
+            Column("case", "Model", text=True),
+            Column("method", "Method", text=True),
+            Column("seed", "seed", digits=0),
+            Column("status", "status", text=True),
+            *(metric_column(name) for name in names),
+        ),
+        blocks=(rows,),
+        notes=(environment_note(contents),),
+    )
+
+
+def tables(contents: Contents) -> list[Table]:
+    """The tables of a suite, the one to read first first."""
+    made = [
+        ablation(contents),
+        success(contents),
+        means_by_kind(contents),
+        conformality(contents),
+        against_published(contents),
+        supplement(contents),
+        comparison(contents),
+        cuts(contents),
+        paired_tests(contents),
+        seed_variance(contents),
+        failures(contents),
+    ]
+    return [table for table in made if table is not None]

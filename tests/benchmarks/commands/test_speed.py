@@ -1,0 +1,49 @@
+"""Rates against the matrix product: what a processor that changes its speed does to them."""
+
+import numpy as np
+import pytest
+
+from benchmarks.commands import speed
+from benchmarks.commands.speed import Work
+
+
+class Clock:
+    """A machine of 100 FLOP/s that serves another program in every other second."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def work(self, operations: float, efficiency: float) -> Work:
+        def run() -> None:
+            left = operations
+            while left > 0:
+                rate = efficiency * (100 if int(self.now) % 2 == 0 else 50)
+                until = int(self.now) + 1 - self.now
+                spent = min(until, left / rate)
+                left -= spent * rate
+                self.now += max(spent, 1e-9)
+
+        return Work(run, operations)
+
+
+def test_a_fraction_is_that_of_the_machine_at_its_speed_of_the_moment(monkeypatch) -> None:
+    clock = Clock()
+    monkeypatch.setattr(speed.time, "perf_counter", lambda: clock.now)
+    monkeypatch.setattr(speed.time, "process_time", lambda: clock.now)
+    product = clock.work(1.0, 1.0)
+    found = speed._rate("a step", clock.work(3.0, 0.6), clock.work(2.0, 0.8), product)
+    assert found.fraction == pytest.approx(0.6, rel=1e-3)
+    assert found.bare_fraction == pytest.approx(0.75, rel=1e-3)
+    assert 30 <= found.gflops * 1e9 <= 60
+
+
+def test_each_row_of_the_table_is_measured(monkeypatch) -> None:
+    small = {"PRODUCT": 32, "STEPS": (100,), "MAPPED": 300, "FEWEST_ROUNDS": 1, "ENOUGH": 0.0}
+    for name, value in small.items():
+        monkeypatch.setattr(speed, name, value)
+    rows = speed.training_rates()
+    assert len(rows) == 5
+    assert all(row.fraction > 0 and row.cpu_seconds > 0 for row in rows)
+    assert np.isnan(rows[0].bare_fraction)
+    assert all(row.bare_fraction > 0 for row in rows[1:])
+    assert speed.training_table().row_count == 5

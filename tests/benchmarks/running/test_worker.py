@@ -1,0 +1,188 @@
+"""What a supervisor makes of a child, and a child of a method."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from baselines import registry
+from benchmarks.running import worker
+from benchmarks.running.environment import ROOT
+from benchmarks.store.archives import read_map, read_surface
+from benchmarks.store.results import Store, measured
+from parapoint.surfaces.parameterization import Parameterization, PointParameterization
+from parapoint.surfaces.surface import Mesh, PointCloud
+from parapoint.testing import sample_surfaces
+
+TRIANGLE = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+CLOUD = PointCloud(TRIANGLE.vertices)
+UV = TRIANGLE.vertices[:, :2]
+
+
+@pytest.mark.parametrize(
+    ("surface", "result", "says"),
+    [
+        (TRIANGLE, Parameterization(UV, [[0, 1, 2]]), ""),
+        (TRIANGLE, Parameterization(UV, [[0, 1, 2]] * 2), "2 corner rows for 1 faces"),
+        (TRIANGLE, PointParameterization(UV), "must be a Parameterization"),
+        (TRIANGLE, None, "returned NoneType for a mesh"),
+        (CLOUD, PointParameterization(UV), ""),
+        (CLOUD, PointParameterization(UV[:2]), "2 uv rows for 3 points"),
+        (CLOUD, UV, "must be a PointParameterization"),
+    ],
+)
+def test_a_result_must_fit_its_surface(surface, result, says):
+    fault = worker.fault(surface, result)
+    assert says in fault
+    assert bool(fault) == bool(says)
+
+
+@pytest.mark.parametrize(
+    ("status", "killed_by_system", "outcome"),
+    [
+        (signal.SIGKILL, True, ("out_of_memory", "killed by the system, which ran out of memory")),
+        (signal.SIGKILL, False, ("failed", "killed by SIGKILL (killed)")),
+        (signal.SIGBUS, True, ("failed", "killed by SIGBUS (bus error)")),
+        (signal.SIGRTMIN + 1, False, ("failed", f"killed by signal {signal.SIGRTMIN + 1}")),
+        (3 << 8, False, ("failed", "ended the process (exit status 3) with no result")),
+    ],
+)
+def test_a_death_is_said_in_words(status, killed_by_system, outcome):
+    said = worker._death(int(status), killed_by_system)
+    assert said["status"] == outcome[0]
+    assert said["reason"].startswith(outcome[1])
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "reason"),
+    [
+        (MemoryError(), "out_of_memory", "MemoryError"),
+        (RuntimeError("DefaultCPUAllocator: can't allocate memory: 8 TB"), "out_of_memory", None),
+        (type("OutOfMemoryError", (RuntimeError,), {})("CUDA"), "out_of_memory", None),
+        (ValueError("a\n  b"), "failed", "ValueError: a b"),
+        (ValueError("x" * 10_000), "failed", "ValueError: " + "x" * 500),
+        (KeyError("key"), "failed", "KeyError: 'key'"),
+    ],
+)
+def test_an_error_is_one_line(error, status, reason):
+    outcome = worker._failure(error)
+    assert outcome["status"] == status
+    assert reason is None or outcome["reason"] == reason
+
+
+def test_a_row_says_what_was_done_to_the_surface_before_and_in_which_component_it_failed(
+    tmp_path, monkeypatch
+):
+    store = Store(tmp_path)
+    with store.writing():
+        surface = store.add_surface(sample_surfaces()["a defective mesh"])
+    method = registry.method("tutte")[1]
+    job = {
+        "spec": "tutte",
+        "plugins": [],
+        "seed": 0,
+        "source_hash": registry.source_hash(method),
+        "surface": str(store.surface_path(surface)),
+        "map": str(tmp_path / "map.npz"),
+    }
+    steps = (
+        "dropped 1 face without area; dropped 1 duplicate face; split 1 non-manifold edge; split 2 "
+        "non-manifold vertices; turned 20 faces; packed 2 components; "
+        "automatic cut to a disk (1 of 2 components)"
+    )
+    receive, send = os.pipe()
+    outcome = worker._outcome(job, send)
+    assert worker._message(bytearray(os.read(receive, 4096))) == {"preprocessing": steps}
+    assert (outcome["status"], outcome["preprocessing"]) == ("ok", steps)
+    mesh, result = read_surface(store.surface_path(surface)), read_map(tmp_path / "map.npz")
+    values = measured(mesh, result)
+    assert values["chart_count"] == 2
+    assert values["degenerate_3d_count"] == 1
+    assert values["degenerate_uv_count"] == 0
+    # The copy lies on its face, whose rows it shares, the other way round.
+    assert values["flipped_fraction"] == 1 / len(mesh.faces)
+    assert values["overlap_pair_fraction"] == 0
+    assert values["overlapped_fraction"] > 0
+    assert values["bijective"] == 0
+
+    def refusing(*_, **__):
+        raise ValueError("no")
+
+    monkeypatch.setattr(type(method), "parameterize", refusing)
+    outcome = worker._outcome(job, send)
+    os.close(receive)
+    os.close(send)
+    assert (outcome["status"], outcome["preprocessing"]) == ("failed", steps)
+    assert outcome["reason"] == "ValueError: no (component 1 of 2, 176 faces)"
+
+
+def test_a_message_counts_only_if_it_is_whole():
+    ahead, whole = b'{"preprocessing": "cut"}\n', b'{"status": "ok"}\n'
+    assert worker._message(bytearray(whole)) == {"status": "ok"}
+    assert worker._message(bytearray(ahead + whole)) == {"preprocessing": "cut", "status": "ok"}
+    for length in range(len(whole)):
+        assert worker._message(bytearray(ahead + whole[:length])) == {"preprocessing": "cut"}
+    assert worker._message(bytearray(b"[1]\n\xff\n3\n")) == {}
+
+
+@pytest.mark.parametrize("forks", [True, False])
+def test_a_supervisor_does_one_cell_after_another(tmp_path, forks):
+    """Where forking is not safe, a fresh interpreter does the same."""
+    if forks and not worker.FORKS:
+        pytest.skip("no forks on this system")
+    with Store(tmp_path).writing():
+        surface = Store(tmp_path).add_surface(TRIANGLE)
+    name = f"Still{forks}"  # plugins stay for the process: each needs a name of its own
+    (tmp_path / "plugin.py").write_text(
+        "from dataclasses import dataclass\n"
+        "from typing import ClassVar\n"
+        "from parapoint import Parameterization\n"
+        "@dataclass(frozen=True)\n"
+        f"class {name}:\n"
+        "    requires: ClassVar[frozenset[str]] = frozenset()\n"
+        "    def parameterize(self, surface, *, seed):\n"
+        "        print('hello')\n"
+        "        return Parameterization(surface.vertices[:, :2] + seed, surface.faces)\n"
+    )
+    plugin = f"{tmp_path}/plugin.py:{name}"
+    spec = registry.register_plugin(plugin)
+    source_hash = registry.source_hash(registry.method(spec)[1])
+    receive, send = os.pipe()
+    code = f"from benchmarks.running import worker; worker.FORKS = {forks}; worker.main()"
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, str(send)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        pass_fds=[send],
+        cwd=ROOT,
+    )
+    os.close(send)
+    assert process.stdin is not None
+    with os.fdopen(receive) as replies:
+        assert json.loads(replies.readline()) == {"status": "ready"}
+        for seed in (3, 4):
+            job = {
+                "spec": spec,
+                "plugins": [plugin],
+                "seed": seed,
+                "source_hash": source_hash,
+                "surface": str(Store(tmp_path).surface_path(surface)),
+                "map": str(tmp_path / "map.npz"),
+                "work": str(tmp_path),
+                "time_limit": 60,
+                "memory_limit": 1e9,
+            }
+            process.stdin.write(json.dumps(job).encode() + b"\n")
+            process.stdin.flush()
+            outcome = json.loads(replies.readline())
+            assert outcome["status"] == "ok", outcome
+            np.testing.assert_array_equal(read_map(tmp_path / "map.npz").uv, UV + seed)
+    printed, _ = process.communicate(timeout=30)
+    assert printed == b"hello\nhello\n"
+    assert process.returncode == 0

@@ -1,0 +1,241 @@
+"""What is done to a surface before a method sees it, and how its maps become one of the surface."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from parapoint import Mesh, Parameterization, PointCloud
+from parapoint.method import UnsupportedError
+from parapoint.surfaces.parameterization import TracePoint
+from parapoint.surfaces.preparation import prepared, shelves
+from parapoint.surfaces.surface import flat_faces
+from parapoint.testing import irregular_disk, sphere
+
+DISK_AFTER_CUT = frozenset({"faces", "disk_after_cut"})
+TETRAHEDRON = Mesh(
+    [[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+)
+DISK = Mesh(TETRAHEDRON.vertices, TETRAHEDRON.faces[:3])
+
+
+@dataclass(frozen=True)
+class Shadow:
+    """The first two coordinates of each vertex: an image tells whose it is."""
+
+    requires: ClassVar[frozenset[str]] = DISK_AFTER_CUT
+
+    def parameterize(self, surface, *, seed):
+        if len(surface.faces) == seed:
+            raise ValueError("will not")
+        uv = surface.vertices[:, :2]
+        area = float(surface.face_areas.sum())
+        trace = tuple(TracePoint(k, 0.5 * k, {"area": area}, uv) for k in (1, 2))
+        return Parameterization(uv, surface.faces, trace, {"faces": len(surface.faces)})
+
+
+def mapped(mesh, requires=DISK_AFTER_CUT):
+    """The preparation of a mesh, and its shadow."""
+    preparation = prepared(mesh, requires)
+    return preparation, preparation.joined(preparation.maps(Shadow(), 0))
+
+
+def moebius(columns=12):
+    """A strip of squares with a half twist; each square is two triangles."""
+    angle = 2 * np.pi * np.arange(columns) / columns
+    rim = []
+    for side in (-1, 1):
+        radius, height = 1 + side * 0.3 * np.cos(angle / 2), side * 0.3 * np.sin(angle / 2)
+        rim.append(np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1))
+    here = np.arange(columns)
+    a, b = here, here + columns
+    c, d = np.append(a[1:], columns), np.append(b[1:], 0)  # the end joins the start, turned over
+    faces = np.concatenate([np.stack([a, c, b], axis=1), np.stack([b, c, d], axis=1)])
+    return Mesh(np.concatenate(rim), faces)
+
+
+def pages(count):
+    """Rectangles of width 1, 2, ... and height 1 that share an edge, as those of a book do."""
+    points, faces = [[0.0, 0, 0], [0, 1, 0]], []
+    for page in range(count):
+        angle = 0.3 + 2 * np.pi * page / count  # none stands across the first axis
+        x, z = (page + 1) * np.cos(angle), (page + 1) * np.sin(angle)
+        k = len(points)
+        points += [[x, 0, z], [x, 1, z]]
+        faces += [[0, k, k + 1], [0, k + 1, 1]]
+    return Mesh(points, faces)
+
+
+def test_what_meets_the_words_is_handed_on_as_it_is():
+    preparation, result = mapped(DISK)
+    assert preparation.parts == (DISK,)
+    assert preparation.steps == ""
+    assert_array_equal(result.corners, DISK.faces)
+    cloud = PointCloud(DISK.vertices)
+    assert prepared(cloud, frozenset()).parts == (cloud,)
+
+
+@pytest.mark.parametrize("mesh", [pages(3), moebius(), TETRAHEDRON])
+def test_a_method_that_asks_for_faces_alone_gets_the_raw_mesh(mesh):
+    preparation = prepared(mesh, frozenset({"faces"}))
+    assert preparation.parts == (mesh,)
+    assert preparation.steps == ""
+
+
+def test_a_closed_surface_is_cut_and_the_step_is_named():
+    preparation, result = mapped(TETRAHEDRON)
+    assert [part.topology for part in preparation.parts] == ["disk"]
+    assert preparation.steps == "automatic cut to a disk"
+    assert_array_equal(result.uv[result.corners], TETRAHEDRON.vertices[TETRAHEDRON.faces][:, :, :2])
+
+
+def test_a_littered_soup_becomes_the_surface_that_it_shows():
+    whole = sphere()
+    rng = np.random.default_rng(0)
+    faces = whole.faces.copy()
+    odd = rng.permutation(len(faces))[:40]
+    faces[odd] = faces[odd][:, ::-1]
+    a, b, c = faces[5]
+    faces = np.concatenate([faces[:10], [[a, b, b], [c, b, a], [c, c, c]], faces[10:]])
+    lone = [[7.0, 7, 7]]
+    soup = Mesh(
+        np.concatenate([lone, whole.vertices[faces].reshape(-1, 3)]),
+        1 + np.arange(3 * len(faces)).reshape(-1, 3),
+    )
+    preparation, result = mapped(soup)
+    assert preparation.steps == (
+        f"welded {3 * len(faces) - 90} vertices; dropped 2 faces without area; dropped 1 duplicate "
+        "face; dropped 1 unreferenced vertex; turned 40 faces; automatic cut to a disk"
+    )
+    assert [part.topology for part in preparation.parts] == ["disk"]
+    # Each corner, those of dropped faces too, has the image of its place.
+    assert_array_equal(result.uv[result.corners], soup.vertices[soup.faces][:, :, :2])
+    assert [point.iteration for point in result.trace] == [1, 2]
+    # Only the cut is a seam: the faces beside one without area are joined through the weld.
+    assert len(np.unique(result.charts())) == 2  # the point is a chart of its own
+
+
+def test_a_face_with_its_vertex_on_its_long_edge_leaves_no_slit():
+    whole = sphere()
+    a, c, d = whole.faces[0]
+    middle = len(whole.vertices)
+    # The face on the other side of c-a is split at the middle; this one is not.
+    other = next(f for f in whole.faces[1:].tolist() if {a, c} <= set(f))
+    apex = next(vertex for vertex in other if vertex not in (a, c))
+    rest = [f for f in whole.faces.tolist() if f not in ([a, c, d], other)]
+    points = np.concatenate([whole.vertices, whole.vertices[[a, c]].mean(axis=0, keepdims=True)])
+    faces = [[a, middle, c], [a, c, d], [c, middle, apex], [middle, a, apex], *rest]
+    mesh = Mesh(points, faces)
+    assert mesh.topology == "sphere"
+    assert flat_faces(mesh.vertices, mesh.faces).sum() == 1
+    preparation, result = mapped(mesh)
+    assert preparation.steps == (
+        "flipped the long edge of 1 face without area; automatic cut to a disk"
+    )
+    (disk,) = preparation.parts
+    assert len(disk.faces) == len(mesh.faces)
+    assert disk.topology == "disk"
+    assert not flat_faces(disk.vertices, disk.faces).any()
+    assert_allclose(disk.face_areas.sum(), whole.face_areas.sum(), rtol=1e-12)
+    assert_array_equal(result.uv[result.corners], points[mesh.faces][:, :, :2])
+
+
+def test_pages_of_a_book_are_split_and_packed_in_one_scale():
+    book = pages(4)
+    preparation, result = mapped(book)
+    assert preparation.steps == (
+        "split 1 non-manifold edge; split 2 non-manifold vertices; packed 4 components"
+    )
+    images = result.uv[result.corners]
+    sides = images[:, 1:] - images[:, :1]
+    uv_areas = np.abs(np.linalg.det(sides)).reshape(4, 2).sum(axis=1) / 2
+    areas = np.array([1.0, 2.0, 3.0, 4.0])
+    assert_allclose(uv_areas, areas, rtol=1e-12)
+    boxes = images.reshape(4, 6, 2)
+    low, high = boxes.min(axis=1), boxes.max(axis=1)
+    for one in range(4):
+        for other in range(one):
+            assert ((high[one] < low[other]) | (high[other] < low[one])).any()
+    assert [(point.iteration, point.seconds) for point in result.trace] == [(1, 2.0), (2, 4.0)]
+    assert result.trace[0].values == {"area": pytest.approx((areas**2).sum() / areas.sum())}
+    assert_array_equal(result.trace[1].uv, result.uv)
+    assert result.report == {"components": 4, "largest": {"faces": 2}}
+
+
+def test_only_what_is_asked_for_is_done():
+    bow_tie = Mesh(
+        [[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0], [-1, -1, 0]], [[0, 1, 2], [0, 3, 4]]
+    )
+    (part,) = prepared(bow_tie, frozenset({"manifold"})).parts
+    assert part.topology == "2 components"
+    assert prepared(bow_tie, frozenset({"connected"})).parts == (bow_tie,)
+    assert len(prepared(bow_tie, frozenset({"connected", "manifold"})).parts) == 2
+    turned = Mesh(
+        DISK.vertices, np.where([[True], [False], [False]], DISK.faces[:, ::-1], DISK.faces)
+    )
+    preparation = prepared(turned, frozenset({"oriented"}))
+    assert preparation.steps == "turned 1 face"
+    assert preparation.parts[0].topology == "disk"
+
+
+def test_a_one_sided_surface_is_cut_open():
+    strip = moebius()
+    preparation, result = mapped(strip)
+    assert preparation.parts[0].topology == "disk"
+    assert "cut a one-sided surface along" in preparation.steps
+    assert_array_equal(result.uv[result.corners], strip.vertices[strip.faces][:, :, :2])
+
+
+def test_an_error_names_its_component():
+    disk = irregular_disk()
+    two = Mesh(
+        np.concatenate([disk.vertices, TETRAHEDRON.vertices + 9]),
+        np.concatenate([disk.faces, TETRAHEDRON.faces + len(disk.vertices)]),
+    )
+    preparation = prepared(two, DISK_AFTER_CUT)
+    assert preparation.steps == ("packed 2 components; automatic cut to a disk (1 of 2 components)")
+    with pytest.raises(ValueError, match="will not") as caught:
+        preparation.maps(Shadow(), 4)
+    assert caught.value.__notes__ == ["(component 2 of 2, 4 faces)"]
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_any_faces_whatever_become_planar_domains(seed):
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(4, 12))
+    points = rng.integers(0, 4, (count, 3)).astype(float)
+    faces = rng.integers(0, count, (int(rng.integers(4, 40)), 3))
+    preparation, result = mapped(Mesh(points, faces))
+    assert all(part.is_planar_domain for part in preparation.parts)
+    kept = ~flat_faces(points, faces)
+    if len(preparation.parts) == 1:
+        images = points[faces][:, :, :2]
+        assert_array_equal(result.uv[result.corners][kept], images[kept])
+    assert sum(len(part.faces) for part in preparation.parts) <= len(faces)
+
+
+def test_what_cannot_be_mended_is_refused_with_the_reason():
+    with pytest.raises(UnsupportedError, match="needs a disk; the surface is sphere"):
+        prepared(TETRAHEDRON, frozenset({"disk"}))
+    line = Mesh([[0.0, 0, 0], [1, 1, 1], [3, 3, 3]], [[0, 1, 2], [0, 0, 1]])
+    with pytest.raises(UnsupportedError, match="no face of the surface has any"):
+        prepared(line, DISK_AFTER_CUT)
+
+
+def test_an_unknown_word_is_a_bug_of_the_method():
+    with pytest.raises(KeyError, match="flat"):
+        prepared(DISK, frozenset({"flat"}))
+
+
+def test_shelves_hold_every_box_apart_and_fill_a_page_that_is_about_square():
+    sizes = np.random.default_rng(1).uniform(0.2, 1, (40, 2))
+    low = shelves(sizes)
+    high = low + sizes
+    apart = (high[:, None] < low[None]).any(axis=2)
+    apart |= apart.T
+    assert apart[~np.eye(40, dtype=bool)].all()
+    width, height = high.max(axis=0) - low.min(axis=0)
+    assert sizes.prod(axis=1).sum() > 0.6 * width * height
+    assert 0.6 < width / height < 1.6

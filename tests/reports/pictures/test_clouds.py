@@ -1,0 +1,100 @@
+import numpy as np
+import pytest
+
+from parapoint.errors import InputError
+from parapoint.surfaces.parameterization import PointParameterization
+from parapoint.surfaces.surface import Mesh, PointCloud
+from reports.pictures import clouds, render
+from reports.pictures.clouds import surface_points
+from reports.pictures.drawing import FIELDS, Map, normal_colours
+from reports.pictures.render import Scene
+
+from ..conftest import ball, flat, lonlat, sheet
+
+
+def test_points_lie_on_the_surface_and_as_dense_everywhere():
+    vertices = np.array([[0.0, 0, 0], [3, 0, 0], [3, 1, 0], [0, 1, 0], [-1, 0, 0]])
+    mesh = Mesh(vertices, [[0, 1, 2], [0, 2, 3], [0, 3, 4]])  # areas 1.5, 1.5, 0.5
+    points = surface_points(mesh, 7000)
+    counts = np.bincount(points.face)
+    np.testing.assert_allclose(counts, [3000, 3000, 1000], rtol=0.06)  # 3 standard deviations
+    assert points.weights.min() >= 0
+    np.testing.assert_allclose(points.weights.sum(axis=1), 1)
+    middle = points.positions[points.face < 2].mean(axis=0)
+    np.testing.assert_allclose(middle, [1.5, 0.5, 0], atol=0.04)
+    np.testing.assert_array_equal(points.positions, surface_points(mesh, 7000).positions)
+
+
+def test_uv_is_interpolated_but_taken_whole_where_a_face_spans_a_seam():
+    mesh = sheet()
+    points = surface_points(mesh, 500)
+    uv = flat(mesh).uv[mesh.faces]
+    spanning = np.zeros(len(mesh.faces), dtype=bool)
+    np.testing.assert_allclose(points.uv(uv, spanning), points.positions[:, :2], atol=1e-12)
+    corners = points.uv(uv, ~spanning)
+    assert all((corners == flat(mesh).uv[:, None]).all(axis=2).any(axis=0))
+
+
+def drawn(mesh, result):
+    scene = Scene(mesh)
+    view = scene.view(render.camera(mesh, np.eye(3)[2], np.eye(3)[1]), 64, 2)
+    found = Map(mesh, result)
+    colours = normal_colours(scene, view.camera)
+    return view, clouds.images(view, found.uv, found.spanning, colours, FIELDS / scene.size)
+
+
+def test_only_the_dense_picture_fills_the_surface():
+    view, made = drawn(sheet(), flat(sheet()))
+    assert list(made) == ["cloud", "cloud-uv", "dense", "seams"]
+    whole = (made["dense"][..., 3] > 0).sum()
+    assert whole == len(np.unique(view.sample // (64 * 2 * 2) * 64 + view.sample % 128 // 2))
+    assert 0.2 * whole < (made["cloud"][..., 3] > 0).sum() < 0.9 * whole
+    again = drawn(sheet(), flat(sheet()))[1]
+    assert all((made[kind] == again[kind]).all() for kind in made)
+
+
+def test_points_on_faces_that_span_the_seam_are_green():
+    def greens(mesh, result):
+        red, green, blue, _ = np.moveaxis(drawn(mesh, result)[1]["seams"].astype(int), 2, 0)
+        return ((green > red + 60) & (green > blue + 60)).sum()
+
+    assert greens(sheet(), flat(sheet())) == 0
+    turned = ball().vertices[:, [1, 2, 0]] * [1, 1, -1]  # the date line faces the camera
+    mesh = Mesh(turned, ball().faces)
+    assert greens(mesh, lonlat(ball())) > 0
+
+
+def waves(count=400):
+    """Points on a wavy sheet, and their map to the plane."""
+    points = surface_points(sheet(), count).positions
+    return PointCloud(points), PointParameterization(points[:, :2])
+
+
+def greens(image):
+    red, green, blue, shown = np.moveaxis(image.astype(int), 2, 0)
+    return int(((green > red + 60) & (green > blue + 60) & (shown > 0)).sum())
+
+
+def test_a_cloud_is_seen_with_its_normals_or_without():
+    cloud, result = waves()
+    normals = np.tile([0.0, 0, 1], (400, 1))
+    for one in (cloud, PointCloud(cloud.points, normals)):
+        made = clouds.Portrait(one, 64, 2, FIELDS).map(result, ("cloud-uv", "dense", "seams"))
+        assert list(made) == ["cloud-uv", "dense", "seams"]
+        covered = {kind: int((image[..., 3] > 0).sum()) for kind, image in made.items()}
+        assert 0.2 * covered["dense"] < covered["seams"] < 0.95 * covered["dense"]
+        shades = made["dense"][made["dense"][..., 3] == 255][:, :3].astype(int)
+        blue = shades[:, 2] > shades[:, 0] + 40  # of the two tones of the board, both are there
+        assert 0.2 < blue.mean() < 0.8
+        assert greens(made["seams"]) == 0
+
+
+def test_where_a_map_of_a_cloud_tears_is_green():
+    cloud, result = waves()
+    portrait = clouds.Portrait(cloud, 64, 2, FIELDS)
+    torn = result.uv + [[1.0, 0]] * (cloud.points[:, :1] > 0.5)
+    assert greens(portrait.map(PointParameterization(torn), ("seams",))["seams"]) > 20
+    with pytest.raises(InputError, match="7 uv rows"):
+        portrait.map(PointParameterization(result.uv[:7]), ("seams",))
+    with pytest.raises(InputError, match="not one of points"):
+        portrait.map(flat(sheet()), ("seams",))

@@ -1,0 +1,55 @@
+import numpy as np
+import pymeshlab
+import pytest
+import trimesh
+
+from parapoint.files.surfaces import read_parameterized
+from reports.contents import contents
+from reports.pictures import exports
+
+from ..conftest import HAND, Writer, ball, flat, lonlat, sheet
+
+
+@pytest.mark.parametrize(("mesh", "result"), [(sheet(), flat(sheet())), (ball(), lonlat(ball()))])
+def test_other_programs_read_the_exports_back(tmp_path, mesh, result):
+    exports.textured(tmp_path / "map", mesh, result)
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "map.obj",
+        "map.mtl",
+        "map.png",
+        "map.glb",
+    }
+    side = np.ptp(result.uv, axis=0).max()
+    expected = ((result.uv - result.uv.min(axis=0)) / side)[result.corners]
+    again, read = read_parameterized(tmp_path / "map.obj")
+    np.testing.assert_array_equal(again.faces, mesh.faces)
+    np.testing.assert_allclose(read.uv[read.corners], expected, atol=1e-15)
+    shape = trimesh.load_mesh(tmp_path / "map.glb", process=False)
+    assert shape.visual.material.baseColorTexture.size == (1024, 1024)
+    np.testing.assert_allclose(shape.visual.uv[shape.faces], expected, atol=1e-6)
+    np.testing.assert_allclose(shape.triangles, mesh.vertices[mesh.faces], atol=1e-6)
+    lab = pymeshlab.MeshSet()
+    lab.load_new_mesh(str(tmp_path / "map.obj"))
+    found = lab.current_mesh().wedge_tex_coord_matrix().reshape(-1, 3, 2)
+    np.testing.assert_allclose(found, expected, atol=1e-6)
+    assert lab.current_mesh().texture_number() == 1
+
+
+def test_exports_are_written_once_and_faults_told(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        row = writer.cell(HAND, sheet(), "lscm", {}, result=flat(sheet()))
+        lost = writer.cell(HAND, sheet(), "slim", {}, result=flat(sheet(), 0.5))
+    (tmp_path / lost.uv_file).unlink()
+    suite = contents(tmp_path)[0]
+    report = tmp_path / "report"
+    for _ in range(2):
+        faults = exports.write(suite, report)
+        assert len(faults) == 1
+        assert "slim" in faults[0]
+    assert exports.written(report, lost) == {}
+    paths = [report / address for address in exports.written(report, row).values()]
+    assert len(paths) == 2
+    before = [path.stat().st_mtime_ns for path in paths]
+    exports.write(suite, report)
+    assert [path.stat().st_mtime_ns for path in paths] == before

@@ -1,0 +1,221 @@
+import dataclasses
+import pickle
+
+import numpy as np
+import pytest
+from matplotlib.text import Text
+from pypdf import PdfReader
+
+from reports import contents as contents_module
+from reports.contents import contents
+from reports.pictures import figures, galleries, plots
+from reports.pictures.figures import draw, drawings, write
+from reports.pictures.galleries import leading
+from reports.pictures.style import figure, look, plain_log, wrapped
+
+from ..conftest import HAND, NEFERTITI, Writer, flat, sheet
+
+
+@pytest.fixture
+def suite(results):
+    return contents(results)[0]
+
+
+def texts(made):
+    return [text.get_text() for text in made.findobj(Text)]
+
+
+def test_every_figure_is_written_with_a_caption(reported):
+    folder = reported / "report" / "figures" / "paper"
+    suite = contents(reported)[0]
+    names = [one.name for one in drawings(suite, folder)]
+    assert names[:3] == ["models", "disks", "clouds"]
+    assert len(names) == len(set(names))
+    for name in names:
+        assert (folder / f"{name}.pdf").read_bytes().startswith(b"%PDF")
+        assert (folder / f"{name}.png").stat().st_size > 1000
+    captions = (folder / "captions.md").read_text()
+    assert all(f"## {name}\n" in captions for name in names)
+
+
+def test_figures_are_drawn_again_only_when_something_changed(suite, tmp_path, monkeypatch):
+    kept = [one for one in drawings(suite, tmp_path) if one.name in {"pareto", "losses"}]
+    monkeypatch.setattr(figures, "drawings", lambda *_: kept)
+    written = []
+    monkeypatch.setattr(
+        figures, "write", lambda *given: (written.append(given[-1].name), write(*given))
+    )
+    draw(suite, tmp_path, tmp_path, 1)
+    draw(suite, tmp_path, tmp_path, 1)
+    assert written == ["pareto", "losses"]
+    kept[0] = dataclasses.replace(kept[0], rows=kept[0].rows[:-1])
+    draw(suite, tmp_path, tmp_path, 1)
+    assert written == ["pareto", "losses", "pareto"]
+
+
+def test_a_large_report_has_no_figure_for_each_model_and_those_of_before_go(
+    results, tmp_path, monkeypatch
+):
+    small = contents(results)[0]
+    assert not small.is_large
+    monkeypatch.setattr(contents_module, "SHEETS", len(small.cases) - 1)
+    large = contents(results)[0]
+    assert large.is_large
+    (gone, *_) = [one for one in drawings(small, tmp_path) if one.name.startswith("maps-")]
+    assert gone.name not in [one.name for one in drawings(large, tmp_path)]
+    kept = [one for one in drawings(large, tmp_path) if one.name == "pareto"]
+    monkeypatch.setattr(figures, "drawings", lambda given, _: [gone] * (given is small) + kept)
+    draw(small, tmp_path, tmp_path, 1)
+    assert (tmp_path / f"{gone.name}.png").exists()
+    draw(large, tmp_path, tmp_path, 1)
+    assert sorted(file.name for file in tmp_path.glob("*.p*")) == ["pareto.pdf", "pareto.png"]
+
+
+def test_the_same_results_give_the_same_bytes(suite, tmp_path):
+    made = next(one for one in drawings(suite, tmp_path) if one.name == "pareto")
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        write(tmp_path / name, False, made)
+    for kind in ("pdf", "png"):
+        one, two = ((tmp_path / name / f"pareto.{kind}").read_bytes() for name in ("one", "two"))
+        assert one == two
+
+
+def test_the_supplements_figure_shows_slim_isometric_beside_parapoint(suite, tmp_path):
+    assert leading(suite, "slim").short == "SLIM symmetric Dirichlet"
+    found = texts(galleries.disks(suite, tmp_path, suite.cases[:2]))
+    assert "SLIM: UV" in found
+    assert "ParaPoint: view 2" in found
+    assert not any(NEFERTITI in text for text in found)
+    assert "no picture" in found  # none was drawn here
+
+
+def test_the_closed_models_figure_says_what_cut_it_and_why_a_map_is_missing(suite, tmp_path):
+    found = texts(galleries.cut_model(suite, NEFERTITI, tmp_path))
+    assert "skipped" in found
+    assert any(text.startswith("(c) ParaPoint") for text in found)
+    assert not any("hand-made" in text for text in found)  # nefertiti has no map of its own
+
+
+def test_convergence_draws_the_quality_along_the_way(suite):
+    made = plots.convergence(suite, suite.cases)
+    panel = next(place for place in made.axes if place.get_title() == HAND)
+    lines = {line.get_label(): line for line in panel.get_lines()}
+    seconds, angles = lines["SLIM symmetric Dirichlet"].get_data()
+    np.testing.assert_allclose(seconds, [0.1, 1.1, 2.1])
+    assert (np.diff(angles) < 0).all()
+    row = suite.shown(HAND, suite.methods[0])
+    measured = suite.measured.set_index("id").loc[row.id, "angle_difference_mean"]
+    assert angles[-1] == pytest.approx(measured)
+
+
+def test_losses_are_those_of_the_trace(suite):
+    made = plots.losses(suite, suite.cases)
+    assert [place.get_title() for place in made.axes] == [HAND, "mannequin-devil"]
+    lines = {line.get_label(): line for line in made.axes[0].get_lines()}
+    np.testing.assert_allclose(lines["total"].get_ydata(), [1, 1 / 2, 1 / 3])
+
+
+def test_singular_values_of_an_isometry_peak_at_one(tmp_path):
+    mesh = sheet()
+    plane = type(mesh)(mesh.vertices * [1, 1, 0], mesh.faces)
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        writer.cell(HAND, plane, "lscm", {}, result=flat(plane))
+    suite = contents(tmp_path)[0]
+    bins = np.linspace(-5, 5, 81)
+    shares = plots.singular_value_shares(suite, suite.rows[0], bins)
+    np.testing.assert_allclose(shares.sum(axis=1), 1)
+    for share in shares:
+        assert share.max() == pytest.approx(1)
+        assert abs(bins[share.argmax()]) < 0.2
+    line = plots.singular_values(suite, [HAND]).axes[0].get_lines()[0]
+    assert abs(line.get_xdata()[line.get_ydata().argmax()]) < 0.2
+
+
+def test_every_method_looks_different(suite):
+    looks = [tuple(map(str, look(suite, label).values())) for label in suite.methods]
+    assert len(set(looks)) == len(looks)
+
+
+def test_figures_without_anything_to_show_are_left_out(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        writer.cell(HAND, sheet(), "lscm", {}, status="failed", reason="it broke")
+    suite = contents(tmp_path)[0]
+    (tmp_path / "f").mkdir()
+    drawn = draw(suite, tmp_path / "p", tmp_path / "f", 1)
+    assert [one.name for one in drawn] == ["models"]
+
+
+def test_a_figure_can_be_made_in_another_process(suite, tmp_path):
+    for name in ("pareto", "losses"):
+        made = next(one for one in drawings(suite, tmp_path) if one.name == name)
+        other = pickle.loads(pickle.dumps(made))  # noqa: S301 (our own bytes)
+        assert other.figure() is not None
+
+
+def test_log_axes_have_plain_numbers():
+    made = figure(2, 2)
+    place = made.add_subplot()
+    place.plot([1, 2], [0.004, 30])
+    place.set_yscale("log")
+    plain_log(place.yaxis)
+    made.canvas.draw()
+    shown = [label.get_text() for label in place.yaxis.get_ticklabels()]
+    assert "0.01" in shown
+    assert not any("10^" in text for text in shown)
+
+
+def test_a_figure_of_many_models_goes_over_several_pages(suite):
+    cases = [f"case {number}" for number in range(10)]
+    made = figures.paged(suite, "n", "T", "C", make=len, cases=cases, size=4)
+    assert [one.name for one in made] == ["n", "n-2", "n-3"]
+    assert [one.title for one in made] == ["T, 1 of 3", "T, 2 of 3", "T, 3 of 3"]
+    assert [one.figure() for one in made] == [4, 4, 2]
+    (one,) = figures.paged(suite, "n", "T", "C", make=len, cases=suite.cases[:1], size=4)
+    assert one.title == "T"
+    assert {row.case for row in one.rows} == {HAND}
+
+
+def test_an_ablation_shows_every_variant_and_the_paper_s_four(tmp_path):
+    writer = Writer(tmp_path)
+    changes = ({}, {"distortion": "isometric"}, {"branches": "2d"}, {"branches": "3d"})
+    base = {"distortion": None, "branches": None, "distortion_weight": None}
+    with writer.store.writing():
+        for case in ("cube_x", "eight_x"):
+            for change in changes:
+                writer.cell(case, sheet(), "parapoint", base | change, result=flat(sheet()))
+    suite = contents(tmp_path)[0]
+    names = [one.name for one in drawings(suite, tmp_path)]
+    assert {"ablation", "ablation-paper"} <= set(names)
+    found = texts(galleries.ablation(suite, tmp_path, suite.cases))
+    assert {"unchanged", "isometric", "2D→3D→2D alone"} <= set(found)
+    four = texts(galleries.ablation_of_the_paper(suite, tmp_path))
+    assert "(a) cube, conformal" in four
+    assert "(d) eight, 3D→2D→3D alone" in four
+
+
+def test_an_ablation_without_the_paper_s_cells_lacks_its_figure(suite, tmp_path):
+    assert galleries.ablation_of_the_paper(suite, tmp_path) is None
+    assert not any(one.name.startswith("ablation") for one in drawings(suite, tmp_path))
+
+
+def test_pictures_in_a_pdf_are_jpegs_of_their_size(tmp_path):
+    shades = np.linspace(0, 255, 64 * 64).reshape(64, 64)
+    smooth = np.stack([shades, shades[::-1], shades.T], axis=2).astype(np.uint8)
+    made = figure(1, 1)
+    made.add_axes((0, 0, 1, 1)).imshow(smooth)
+    write(tmp_path, False, figures.Drawing("a", "A <title>", "", (), lambda: made))
+    document = PdfReader(tmp_path / "a.pdf")
+    (picture,) = document.pages[0].images
+    assert picture.name.endswith(".jpg")
+    assert document.metadata.title == "A <title>"
+    # From the last row on; a colour stands for four pixels.
+    np.testing.assert_allclose(np.asarray(picture.image.convert("RGB"))[::-1], smooth, atol=20)
+
+
+def test_names_are_parted_at_spaces_hyphens_and_underscores():
+    assert wrapped("SLIM symmetric Dirichlet", 15) == "SLIM symmetric\nDirichlet"
+    assert wrapped("nefertiti-lowres_odedstein", 20) == "nefertiti-lowres_\nodedstein"
+    assert wrapped("beetle", 3) == "beetle"

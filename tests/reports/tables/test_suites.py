@@ -1,0 +1,59 @@
+import pytest
+
+from reports.contents import contents
+from reports.tables.suites import comparison, conformality, failures, supplement
+
+from ..conftest import DEVIL, HAND, HOSTILE, NEFERTITI
+
+
+def test_conformality_keeps_published_figures_apart(results):
+    made = conformality(contents(results)[0])
+    by_case = {row["case"]: row for row in made.blocks[0]}
+    assert by_case[HAND]["published SLIM"] == 0.609
+    assert by_case[HAND]["published ParaPoint"] == 0.182
+    assert by_case[DEVIL]["claim"] == "stand-in"
+    assert by_case[NEFERTITI]["SLIM symmetric Dirichlet"] == "skipped"
+    groups = {column.group for column in made.columns if column.key.startswith("published")}
+    assert groups == {"Published, other files"}
+    assert all(not c.better for c in made.columns if c.key.startswith("published"))
+    assert by_case[HAND]["SLIM conformal"] < by_case[HAND]["SLIM symmetric Dirichlet"]
+
+
+def test_the_supplement_names_energy_iterations_cut_and_verdict(results):
+    made = supplement(contents(results)[0])
+    rows = {(row["case"], row["method"]): row for block in made.blocks for row in block}
+    hand = rows[f"{HAND} (likely)", "SLIM (symmetric Dirichlet, 20 iterations)"]
+    assert hand["verdict"] == "lower (better)"
+    assert hand["done"] == "1/1"
+    assert hand["chart_count"] == 1
+    devil = rows[f"{DEVIL} (stand-in)", "SLIM (symmetric Dirichlet, 20 iterations)"]
+    assert devil["verdict"] == "none: stand-in"
+    assert rows[f"{HAND} (likely)", "SLIM (conformal, 20 iterations)"]["verdict"] == ""
+    learned = rows[f"{NEFERTITI} (likely)", "ParaPoint (paper) + automatic cut"]
+    assert learned["spanning_fraction"] > 0
+    skipped = rows[f"{NEFERTITI} (likely)", "SLIM (symmetric Dirichlet, 20 iterations)"]
+    assert skipped["done"] == "skipped"
+    assert any("0123456789ab" in note and "Seeds: 0, 3" in note for note in made.notes)
+
+
+def test_comparison_counts_and_common_means(results):
+    suite = contents(results)[0]
+    made = comparison(suite, ["angle_difference_mean"])
+    rows = {row["method"]: row for row in made.blocks[0]}
+    slim, ours = rows["SLIM symmetric Dirichlet"], rows["ParaPoint"]
+    assert slim["count"] == "2/2"
+    assert slim["skipped"] == 1
+    assert ours["count"] == "3/3"
+    values = suite.means[suite.means["label"] == "ParaPoint"]["angle_difference_mean"]
+    assert ours["mean"] == pytest.approx(values.mean())
+    assert ours["worst"] == values.max()
+    # All methods that ever succeed do so on the two sheets.
+    assert ours["common"] == pytest.approx(values.iloc[:2].mean())
+    assert rows[HOSTILE]["mean"] is None
+    assert f"2: {HAND}, {DEVIL}" in made.caption
+
+
+def test_failures_are_told_with_status_and_reason(results):
+    made = failures(contents(results)[0])
+    told = {row["status"]: row["reason"] for row in made.blocks[0]}
+    assert told == {"skipped": f"needs a disk {HOSTILE}", "timeout": "over 10 s"}
