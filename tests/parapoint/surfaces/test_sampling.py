@@ -5,8 +5,15 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from parapoint import Mesh
-from parapoint.surfaces.sampling import even_sample, hull_sample, surface_sample, training_points
+from parapoint import Mesh, PointCloud
+from parapoint.errors import InputError
+from parapoint.surfaces.sampling import (
+    even_sample,
+    hull_sample,
+    mean_spacing,
+    surface_sample,
+    training_points,
+)
 from parapoint.testing import irregular_disk
 
 
@@ -134,3 +141,15 @@ def test_vertices_beside_another_sheet_make_a_mesh_coarse_from_half_a_percent_on
             np.concatenate([sheet.faces, new[sheet.faces[inside]]]),
         )
         assert len(training_points(both, 20_000, 0)) == count
+
+
+def test_the_spacing_is_the_mean_distance_to_the_nearest_point() -> None:
+    # From 0, 1 and 3 on a line: 1, 1 and 2.
+    assert mean_spacing(np.array([[0.0, 0, 0], [1.0, 0, 0], [3.0, 0, 0]])) == pytest.approx(4 / 3)
+
+
+def test_points_on_a_line_are_refused_and_those_in_a_plane_are_not() -> None:
+    plane = np.pad(np.random.default_rng(0).uniform(size=(150, 2)), ((0, 0), (0, 1)))
+    assert rows(training_points(PointCloud(plane), 200, 0)) == rows(plane)
+    with pytest.raises(InputError, match="on a line"):
+        training_points(PointCloud(plane * [1, 0, 0] + [0, 2, 5]), 200, 0)
