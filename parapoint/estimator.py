@@ -28,7 +28,7 @@ from parapoint.learned.charts import Chart, Charts
 from parapoint.learned.losses import DISTORTIONS, EIGENVALUES
 from parapoint.learned.networks import ACTIVATIONS, Networks, SubNetworks, SurfaceNetworks
 from parapoint.learned.presets import SMOOTH, Preset
-from parapoint.learned.trainer import PRECISIONS, DivergedError, Step, Trainer
+from parapoint.learned.trainer import DivergedError, Step, Trainer
 from parapoint.surfaces.components import components
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization, TracePoint
 from parapoint.surfaces.sampling import FEWEST_POINTS, rows_left_out, training_points
@@ -94,7 +94,6 @@ class ParaPoint:
         distortion_weight: its weight; the paper's text has 1e-4 for complex shapes.
         eigenvalues: "singular" or "gram", the readings of "the eigenvalues of the Jacobian".
         warm_up: share of the run that goes to the convex hull.
-        precision: "float32" or "bfloat16" (see `Preset`).
         branches: "both", or an ablation: "3d" (3D→2D→3D alone) or "2d" (2D→3D→2D alone).
         components: "together", one map for the whole surface; "each", one for each component
             (`parapoint.surfaces.components` says what that is), side by side in the plane; or
@@ -122,7 +121,6 @@ class ParaPoint:
     subset: int | None = None
     all_from: float | None = None
     warm_up: float | None = None
-    precision: str | None = None
     distortion: str | None = None
     distortion_weight: float | None = None
     eigenvalues: str | None = None
@@ -534,7 +532,6 @@ class ParaPoint:
             "points_of_a_step": min(preset.subset, len(self.points_)),
             "iterations": trainer.iteration,
             "warm_up": preset.warm_up,
-            "precision": trainer.precision,
             "weights": trainer.weights,
             "distortion": preset.distortion,
             "eigenvalues": preset.eigenvalues,
@@ -565,7 +562,6 @@ class ParaPoint:
         for name, choices in (
             ("distortion", DISTORTIONS),
             ("eigenvalues", EIGENVALUES),
-            ("precision", PRECISIONS),
             ("branches", ("both", "3d", "2d")),
             ("components", ("together", "each", "largest")),
         ):

@@ -107,6 +107,7 @@ def straightforward_maps(
     import torch
     from torch import nn
 
+    from parapoint.learned.optimizers import AdamW
     from parapoint.learned.presets import PAPER
 
     def nearest(queries: Tensor, among: Tensor, count: int) -> Tensor:
@@ -146,7 +147,7 @@ def straightforward_maps(
     parameters = [
         p for net in (embed2, move2, embed3, move3, unwrap, wrap, stitch) for p in net.parameters()
     ]
-    optimizer = torch.optim.AdamW(parameters, PAPER.learning_rate, weight_decay=PAPER.weight_decay)
+    optimizer = torch.optim.AdamW(parameters, AdamW.learning_rate, weight_decay=AdamW.weight_decay)
     P, watched = torch.as_tensor(points).float(), torch.as_tensor(at).float()
     side = torch.linspace(-1, 1, round(math.sqrt(len(P))))
     grid = torch.cartesian_prod(side, side)

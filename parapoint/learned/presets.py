@@ -25,6 +25,8 @@ class Preset:
         iterations: steps, warm-up included (the text gives none; the group's later code 10,000).
         subset: points that go through the networks in a step before `all_from`, drawn anew each
             time (open: "a sparser subset"); the Chamfer distance is to all points throughout.
+        patch: points of a step that lie beside one another, each centre's nearest of all points, so
+            that terms which compare neighbours see neighbours; 1 draws each for itself (open).
         all_from: share of the run after which each step takes all points (open: "later").
         warm_up: share of the run that goes to the points' convex hull (open).
         perturbation: standard deviation of the noise on points, in mean distances between
@@ -40,10 +42,8 @@ class Preset:
         anti_flip_angle: T_angle.
         seam_neighbours: K_cut.
         seam_threshold: T_cut, a fraction of L(Q).
-        learning_rate, final_learning_rate: ends of the cosine (open; from the later code).
-        weight_decay: of AdamW (open; from the later code).
-        precision: "float32", or "bfloat16" for the wide products of training where the processor
-            has units for them (twice as fast; the gradient's direction stays, cosine 0.9995).
+        optimizer: "adamw", as in the group's later code, or "soap" (open).
+        learning_rate: with which the run begins; None takes the optimiser's own (open).
     """
 
     hidden: tuple[int, ...] = (64, 128, 512, 128)
@@ -54,6 +54,7 @@ class Preset:
     points: int = 10_000
     iterations: int = 10_000
     subset: int = 2_048
+    patch: int = 1
     all_from: float = 0.5
     warm_up: float = 0.15
     perturbation: float = 0.1
@@ -71,10 +72,8 @@ class Preset:
     anti_flip_angle: float = math.pi / 2
     seam_neighbours: int = 3
     seam_threshold: float = 0.01
-    learning_rate: float = 1e-3
-    final_learning_rate: float = 1e-5
-    weight_decay: float = 1e-8
-    precision: str = "float32"
+    optimizer: str = "adamw"
+    learning_rate: float | None = None
 
 
 PAPER = Preset()

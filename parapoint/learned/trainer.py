@@ -16,19 +16,21 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from parapoint.learned import losses
+from parapoint.learned.batches import Cloud, lattice
 from parapoint.learned.networks import ACTIVATIONS, Cycle, Networks, SurfaceNetworks
+from parapoint.learned.optimizers import OPTIMIZERS
 from parapoint.learned.presets import Preset
 from parapoint.surfaces.sampling import hull_sample, mean_spacing
 from parapoint.surfaces.surface import FloatArray
 
 SNAPSHOTS = 100
 """States kept in a run, evenly: the last good one is where a diverged run begins again."""
-PRECISIONS = {"float32": torch.float32, "bfloat16": torch.bfloat16}
-"""What `Preset.precision` may name."""
 DIVERGED = 10.0
 """A mean loss this many times the phase's lowest has diverged."""
 SMALLER_STEP = 0.3
 """Factor on the learning rate after a divergence."""
+LAST_RATE = 0.01
+"""The last learning rate over the first; a cosine leads from one to the other."""
 LARGEST_KEPT = 31 * 2**20
 """Bytes of the largest block by whose release glibc learns to keep freed memory: under 32 MiB."""
 
@@ -54,60 +56,6 @@ class Step(NamedTuple):
     seconds: float
     phase: str
     losses: dict[str, float]
-
-
-class AdamW:
-    """Adam with decoupled weight decay (Loshchilov and Hutter 2019, algorithm 2).
-
-    The same as `torch.optim.AdamW` with its defaults, whose first use takes two seconds of imports.
-    """
-
-    def __init__(self, parameters: list[Tensor], weight_decay: float) -> None:
-        self.parameters, self.weight_decay = parameters, weight_decay
-        self.steps = [torch.zeros((), device=p.device) for p in parameters]
-        self.first = [torch.zeros_like(p) for p in parameters]
-        self.second = [torch.zeros_like(p) for p in parameters]
-
-    @torch.no_grad()
-    def step(self, learning_rate: float) -> None:
-        """Move the parameters that have a gradient, and drop the gradients."""
-        rows = [
-            (parameter, parameter.grad, *moments)
-            for parameter, *moments in zip(
-                self.parameters, self.first, self.second, self.steps, strict=True
-            )
-            if parameter.grad is not None
-        ]
-        parameters, gradients, first, second, steps = (list(of) for of in zip(*rows, strict=True))
-        torch._foreach_add_(steps, 1)
-        # The kernel that torch.optim calls.
-        torch._fused_adamw_(
-            parameters,
-            gradients,
-            first,
-            second,
-            [],
-            steps,
-            lr=learning_rate,
-            beta1=0.9,
-            beta2=0.999,
-            weight_decay=self.weight_decay,
-            eps=1e-8,
-            amsgrad=False,
-            maximize=False,
-        )
-        for parameter in parameters:
-            parameter.grad = None
-
-    def state(self) -> dict[str, Tensor]:
-        """The moments by name, not copied."""
-        moments = {"steps": self.steps, "first": self.first, "second": self.second}
-        return {f"{name}.{i}": t for name, of in moments.items() for i, t in enumerate(of)}
-
-    def restore(self, state: dict[str, Tensor]) -> None:
-        """Copy in what `state` returned."""
-        for name, tensor in self.state().items():
-            tensor.copy_(state[name])
 
 
 _FACTS = (
@@ -165,14 +113,13 @@ class Trainer:
                 self.generator,
             )
         self.networks = networks.to(device)
-        self.precision = usable_precision(preset.precision, device)
-        self.networks.train_in(PRECISIONS[self.precision])
-        self.optimizer = AdamW(list(self.networks.parameters()), preset.weight_decay)
+        parameters: list[Tensor] = list(self.networks.parameters())
+        self.optimizer = OPTIMIZERS[preset.optimizer](parameters)
         self.device = device
-        self.shape = self.prepared(points)
-        self.hull = self.shape
+        self.shape = self.hull = Cloud(self.prepared(points), preset.patch)
         if preset.warm_up:
-            self.hull = self.prepared(hull_sample(points, len(points), seed))
+            hull = hull_sample(points, len(points), seed)
+            self.hull = Cloud(self.prepared(hull), preset.patch)
         self.noise = preset.perturbation * mean_spacing(points)
         self.iteration = 0
         self.seconds = 0.0
@@ -309,7 +256,7 @@ class Trainer:
     def _step(self) -> dict[str, float]:
         """One iteration: its unweighted terms and the weighted total."""
         try:
-            terms = self.terms(*self._batch(), self._cloud()[0])
+            terms = self.terms(*self._batch(), self._cloud().points)
         except losses.NotFiniteError:
             return {"total": math.nan}
         total = torch.stack([self.weights[name] * value for name, value in terms.items()]).sum()
@@ -319,25 +266,23 @@ class Trainer:
         return {name: value.item() for name, value in {**terms, "total": total}.items()}
 
     def _learning_rate(self) -> float:
-        first, last = self.preset.learning_rate, self.preset.final_learning_rate
+        first = self.preset.learning_rate or self.optimizer.learning_rate
         cosine = (1 + math.cos(math.pi * self.progress)) / 2
-        return (last + (first - last) * cosine) * SMALLER_STEP**self.divergences
+        return first * (LAST_RATE + (1 - LAST_RATE) * cosine) * SMALLER_STEP**self.divergences
 
     def _batch(self) -> tuple[Tensor, Tensor]:
         """Perturbed points of the phase (see `prepared`) and a perturbed lattice (about n, 2)."""
         cloud = self._cloud()
-        size = cloud.shape[1]
-        if self._phase() != "all" and self.preset.subset < size:
-            size = self.preset.subset
-            chosen = torch.randperm(cloud.shape[1], generator=self.generator)[:size]
-            cloud = cloud[:, chosen.to(self.device)]
-        noise = torch.zeros(cloud.shape)
+        size = len(cloud.points) if self._phase() == "all" else self.preset.subset
+        rows = cloud.drawn(size, self.generator)
+        size = rows.shape[1]
+        noise = torch.zeros(rows.shape)
         noise[0] = self.noise * torch.randn(size, 3, generator=self.generator)
         grid = lattice(round(math.sqrt(size)), self.generator)
-        return cloud + noise.to(self.device), grid.to(self.device)
+        return rows + noise.to(self.device), grid.to(self.device)
 
-    def _cloud(self) -> Tensor:
-        """All points that the phase is fitted to (see `prepared`)."""
+    def _cloud(self) -> Cloud:
+        """What the phase is fitted to."""
         return self.hull if self._phase() == "hull" else self.shape
 
 
@@ -390,21 +335,6 @@ def keep_freed_memory() -> None:
     is never written, so it takes no memory; other C libraries see a block come and go.
     """
     torch.empty(LARGEST_KEPT, dtype=torch.uint8)
-
-
-def usable_precision(wanted: str, device: str) -> str:
-    """The precision wanted, or "float32" where the device has no units for it."""
-    if device == "cuda":
-        is_fast = torch.cuda.is_bf16_supported()
-    else:
-        is_fast = torch.cpu._is_amx_tile_supported()  # noqa: SLF001 (there is no public name)
-    return wanted if is_fast else "float32"
-
-
-def lattice(side: int, generator: torch.Generator) -> Tensor:
-    """(side², 2) a lattice of cells in [−1, 1]², one point in each, anywhere in it."""
-    cells = torch.cartesian_prod(torch.arange(side), torch.arange(side))
-    return (cells + torch.rand(side * side, 2, generator=generator)) * (2 / side) - 1
 
 
 def oriented_normals(points: FloatArray, neighbours: int = 12) -> FloatArray:

@@ -8,10 +8,8 @@ import torch
 from parapoint.learned import losses, trainer
 from parapoint.learned.presets import PAPER
 from parapoint.learned.trainer import (
-    AdamW,
     DivergedError,
     Trainer,
-    lattice,
     oriented_normals,
     tangent_frames,
 )
@@ -30,27 +28,6 @@ def tiny(**changes: object) -> Trainer:
 
 def weights(of: Trainer) -> np.ndarray:
     return torch.cat([p.detach().flatten() for p in of.networks.parameters()]).numpy()
-
-
-def test_adamw_is_that_of_torch() -> None:
-    def copies() -> list[torch.nn.Parameter]:
-        generator = torch.Generator().manual_seed(1)
-        return [torch.nn.Parameter(torch.randn(4, 3, generator=generator)) for _ in range(3)]
-
-    def gradients(parameters: list[torch.nn.Parameter]) -> None:
-        sum((p.square() * (k + 1) + p).sum() for k, p in enumerate(parameters[:2])).backward()
-
-    ours, theirs = copies(), copies()
-    own, other = AdamW(ours, 0.1), torch.optim.AdamW(theirs, lr=1e-2, weight_decay=0.1)
-    for _ in range(20):
-        gradients(ours)
-        own.step(1e-2)
-        gradients(theirs)
-        other.step()
-        other.zero_grad()
-    for mine, its in zip(ours, theirs, strict=True):
-        torch.testing.assert_close(mine, its)
-    assert torch.equal(ours[2], copies()[2])  # without a gradient nothing decays
 
 
 def test_the_run_goes_from_the_hull_to_a_subset_to_all_points(monkeypatch) -> None:
@@ -182,14 +159,6 @@ def test_the_run_ends_with_the_best_state_of_its_last_phase(monkeypatch) -> None
     list(of.run())
     assert states == list(range(8))
     assert np.unique(weights(of)).tolist() == [5.0]
-
-
-def test_a_lattice_has_one_point_in_each_cell() -> None:
-    points = lattice(4, torch.Generator().manual_seed(0)).numpy()
-    cells = np.floor((points + 1) * 2).astype(int)
-    assert len(np.unique(cells, axis=0)) == 16
-    assert cells.min() == 0
-    assert cells.max() == 3
 
 
 def test_a_planar_cloud_warms_up_on_itself() -> None:
