@@ -28,6 +28,8 @@ class Preset:
         patch: points of a step that lie beside one another, each centre's nearest of all points, so
             that terms which compare neighbours see neighbours; 1 draws each for itself (open).
         all_from: share of the run after which each step takes all points (open: "later").
+        starts: runs from other weights, of which the one with the lowest loss goes on (open).
+        start_share: share of the run that goes to each, where there are several (open).
         warm_up: share of the run that goes to the points' convex hull (open).
         perturbation: standard deviation of the noise on points, in mean distances between
             neighbouring training points (open: "slightly").
@@ -56,6 +58,8 @@ class Preset:
     subset: int = 2_048
     patch: int = 1
     all_from: float = 0.5
+    starts: int = 1
+    start_share: float = 0.05
     warm_up: float = 0.15
     perturbation: float = 0.1
     unwrap_weight: float = 0.01

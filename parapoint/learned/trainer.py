@@ -63,7 +63,10 @@ _FACTS = (
     "seconds",
     "divergences",
     "_phase_now",
+    "_start",
     "_lowest",
+    "_last",
+    "_lowest_start",
     "_next_snapshot",
     "_sums",
     "_count",
@@ -86,7 +89,8 @@ class Trainer:
         device: "cpu" or "cuda".
         time_budget: seconds after which the run ends; the schedule follows the time where that
             comes before the preset's number of iterations.
-        networks: what to train, all its parameters; new networks of the preset by default.
+        networks: what to train, all its parameters; new networks of the preset by default, which
+            may have several starts.
 
     Attributes:
         seconds: spent so far; what was spent before the run may be added, as part of the budget.
@@ -105,14 +109,8 @@ class Trainer:
         keep_freed_memory()
         self.preset, self.time_budget = preset, time_budget
         self.generator = torch.Generator().manual_seed(seed)
-        if networks is None:
-            networks = Networks(
-                preset.hidden,
-                preset.embedding,
-                ACTIVATIONS[preset.activation],
-                self.generator,
-            )
-        self.networks = networks.to(device)
+        self.starts = preset.starts if networks is None else 1
+        self.networks = (self._new_networks() if networks is None else networks).to(device)
         parameters: list[Tensor] = list(self.networks.parameters())
         self.optimizer = OPTIMIZERS[preset.optimizer](parameters)
         self.device = device
@@ -125,7 +123,9 @@ class Trainer:
         self.seconds = 0.0
         self.divergences = 0
         self._phase_now = ""
-        self._lowest = math.inf
+        self._start = 0
+        self._lowest = self._last = self._lowest_start = math.inf
+        self._best_start: dict[str, Tensor] = {}
         self._next_snapshot = 1 / SNAPSHOTS
         self._sums: dict[str, float] = {}
         self._count = 0
@@ -165,8 +165,16 @@ class Trainer:
         by_time = 0.0 if self.time_budget is None else self.seconds / self.time_budget
         return min(1.0, max(self.iteration / self.preset.iterations, by_time))
 
+    @property
+    def schedule(self) -> float:
+        """Where the schedule is, in [0, 1]: as `progress`, but each start begins it anew."""
+        share, others = self.preset.start_share, self.starts - 1
+        return (self.progress - share * min(self._start, others)) / (1 - share * others)
+
     def run(self) -> Iterator[Step]:
         """Train to the end, a `Step` for each iteration; leave the networks at the best state.
+
+        Of several starts the one whose last mean loss is lowest goes on.
 
         Best: the lowest mean loss between two snapshots of the last phase (losses of different
         phases do not compare: the Chamfer distance falls with the number of points).
@@ -190,16 +198,18 @@ class Trainer:
             self.seconds += now - begin  # what is done between steps counts too
             begin = now
             means: dict[str, float] = {}
-            ends_phase = self.progress == 1 or self._phase() != phase
+            ends_phase = self.progress == 1 or self._phase() != phase or self._start_ends()
             if ends_phase or self.progress >= self._next_snapshot:
                 means = {name: total / self._count for name, total in self._sums.items()}
                 self._snapshot(means["total"])
+            if self._start_ends():
+                self._next_start()
             yield Step(self.iteration, self.progress, self.seconds, phase, means)
         self._restore(self._good)
 
     def tensors(self) -> dict[str, Tensor]:
         """What a checkpoint holds as tensors: this state, the last good one, the generator."""
-        kept = {"now": self._state(), "good": self._good}
+        kept = {"now": self._state(), "good": self._good, "start": self._best_start}
         return {
             "generator": self.generator.get_state(),
             **{f"{key}.{name}": t for key, state in kept.items() for name, t in state.items()},
@@ -214,8 +224,31 @@ class Trainer:
         self.generator.set_state(tensors["generator"])
         self._restore(_under("now.", tensors))
         self._good = _under("good.", tensors)
+        self._best_start = _under("start.", tensors)
         for name in _FACTS:
             setattr(self, name, facts[name])
+
+    def _new_networks(self) -> Networks:
+        activation = ACTIVATIONS[self.preset.activation]
+        return Networks(self.preset.hidden, self.preset.embedding, activation, self.generator)
+
+    def _start_ends(self) -> bool:
+        """Whether one of several starts is done."""
+        ends = (self._start + 1) * self.preset.start_share
+        return 1 < self.starts > self._start and self.progress >= ends
+
+    def _next_start(self) -> None:
+        """Begin the next start; after the last one go on with the best."""
+        if self._last < self._lowest_start:
+            self._lowest_start, self._best_start = self._last, deepcopy(self._state())
+        self._start += 1
+        if self._start < self.starts:
+            self.networks.load_state_dict(self._new_networks().state_dict())
+            begun = {name: torch.zeros_like(t) for name, t in self.optimizer.state().items()}
+            self.optimizer.restore(begun)
+        else:
+            self._restore(self._best_start)
+        self._phase_now, self._good = "", deepcopy(self._state())
 
     def _state(self) -> dict[str, Tensor]:
         """Weights and optimiser state by name, not copied."""
@@ -233,6 +266,7 @@ class Trainer:
         A loss that merely rises is let rise: the run ends with the best state anyhow.
         """
         self._next_snapshot = self.progress + 1 / SNAPSHOTS
+        self._last = total
         self._sums, self._count = {}, 0
         if math.isfinite(total) and total <= DIVERGED * self._lowest:
             if total < self._lowest:
@@ -249,9 +283,9 @@ class Trainer:
         return self.time_budget is None or self.seconds + seconds <= self.time_budget
 
     def _phase(self) -> str:
-        if self.progress < self.preset.warm_up:
+        if self.schedule < self.preset.warm_up:
             return "hull"
-        return "subset" if self.progress < self.preset.all_from else "all"
+        return "subset" if self.schedule < self.preset.all_from else "all"
 
     def _step(self) -> dict[str, float]:
         """One iteration: its unweighted terms and the weighted total."""
@@ -267,7 +301,7 @@ class Trainer:
 
     def _learning_rate(self) -> float:
         first = self.preset.learning_rate or self.optimizer.learning_rate
-        cosine = (1 + math.cos(math.pi * self.progress)) / 2
+        cosine = (1 + math.cos(math.pi * self.schedule)) / 2
         return first * (LAST_RATE + (1 - LAST_RATE) * cosine) * SMALLER_STEP**self.divergences
 
     def _batch(self) -> tuple[Tensor, Tensor]:
