@@ -1,4 +1,4 @@
-"""One-to-one SLIM along seams: those that ParaPoint learns, the automatic cut, an artist's."""
+"""One-to-one SLIM along seams: those of the computed map, the automatic cut, an artist's."""
 
 from __future__ import annotations
 
@@ -23,9 +23,8 @@ from baselines.disks.slim import DENSITIES, stepper
 from baselines.disks.tutte import tutte
 from baselines.packing import by_component
 from parapoint.computed.bijection import BijectionError, isometric_map
+from parapoint.computed.computed_map import ComputedMap
 from parapoint.errors import InputError
-from parapoint.estimator import ParaPoint
-from parapoint.learned import presets
 from parapoint.method import UnsupportedError
 from parapoint.surfaces.cutting import cut_along, cut_to_disk, edge_graph, edge_lengths, path_to
 from parapoint.surfaces.parameterization import Parameterization
@@ -52,51 +51,50 @@ MOST_BRANCHES = 10
 
 @dataclass(frozen=True)
 class ParaPointSLIM:
-    """SLIM on the mesh cut along the seams that ParaPoint learns; no flips, one to one.
+    """SLIM on the mesh cut along the seams of the computed map; no flips, one to one.
 
-    ParaPoint maps the vertices; along its seam, made a clean path of edges
+    `ComputedMap` maps the vertices; along its seam, made a clean path of edges
     (`parapoint.surfaces.spanning`), the mesh is cut. SLIM (M. Rabinovich et al. 2017) starts from a
-    bijective map of small energy (`parapoint.computed.bijection`), or from ParaPoint's map where
+    bijective map of small energy (`parapoint.computed.bijection`), or from the computed map where
     that has less and is one to one on the cut mesh. A step after which the boundary would cross
     itself is taken anew with the vertices that cross held where they are, so the map stays one to
     one. Then the seam grows to where the map is most distorted (X. Gu et al. 2002, "Geometry
     images"), as long as that pays.
 
     A disk, with or without holes, is cut only where that pays; where its map without a cut is so
-    good that none could, ParaPoint is not fitted. Components are mapped one after another.
+    good that none could, no map is computed. Components are mapped one after another.
 
     Attributes:
-        preset: of ParaPoint.
-        points: of ParaPoint; None for the preset's, or fewer for a mesh of few faces.
-        time_budget: of ParaPoint, in seconds for each component; None for its own.
+        points: of the computed map; None for its own number, or fewer for a mesh of few faces.
+        time_budget: of the computed map, in seconds for each component; None for no bound.
         iterations: steps of SLIM, at least 1; the longer seam takes more.
         price: what the symmetric Dirichlet energy (4 at least) must fall by for each sqrt(area) of
             seam; None for the learned seam, no shorter and no longer.
     """
 
-    preset: str = "fast"
     points: int | None = None
     time_budget: float | None = None
     iterations: int = 20
     price: float | None = 0.1
 
     requires: ClassVar[frozenset[str]] = frozenset({"faces", "manifold", "oriented", "connected"})
-    packages: ClassVar[tuple[str, ...]] = ("torch", "libigl", "shapely")
+    packages: ClassVar[tuple[str, ...]] = ("libigl", "shapely")
 
     def __post_init__(self) -> None:
         _check(self.iterations, self.price)
 
     @property
     def deterministic(self) -> bool:
-        """Whether the same seed gives the same map: as ParaPoint's."""
-        return ParaPoint(self.preset, time_budget=self.time_budget).deterministic
+        """Whether the same seed gives the same map: as the computed map's."""
+        return ComputedMap(time_budget=self.time_budget).deterministic
 
     def parameterize(self, surface: Surface, *, seed: int) -> Parameterization:
         """The map, in the scale of the surface.
 
         Raises:
             UnsupportedError: the surface is a point cloud; shapely is not installed.
-            InputError: a triangle has no area; ParaPoint cannot be fitted.
+            InputError: a triangle has no area.
+            ReconstructionError: no map can be computed.
             FlatteningError: no start without flips was found.
         """
         if not isinstance(surface, Mesh):
@@ -104,10 +102,10 @@ class ParaPointSLIM:
         mesh = _sound(surface)
         whole = self._uncut(mesh)
         if whole is not None and whole.energy - LEAST_ENERGY <= self._least_cost(mesh):
-            report = {**whole.report(), "learned_seam_edges": 0, "parapoint": "no cut could pay"}
+            report = {**whole.report(), "learned_seam_edges": 0, "computed": "no cut could pay"}
             return Parameterization(whole.uv, whole.mesh.faces, report=report)
-        points = self.points or _enough_points(mesh, presets.named(self.preset).points)
-        model = ParaPoint(self.preset, points=points, time_budget=self.time_budget)
+        points = self.points or _enough_points(mesh, ComputedMap().points)
+        model = ComputedMap(points, time_budget=self.time_budget)
         learned = model.parameterize(mesh, seed=seed)
         seam = learned_seam(mesh, learned.uv)
         run = _Run(cut_along(mesh, mesh.edges[seam]))
@@ -121,7 +119,7 @@ class ParaPointSLIM:
         report = {
             **run.report(),
             "learned_seam_edges": int(seam.sum()),
-            "parapoint": dict(learned.report),
+            "computed": dict(learned.report),
         }
         return Parameterization(run.uv, run.mesh.faces, report=report)
 
@@ -145,7 +143,7 @@ class ParaPointSLIM:
 
 @dataclass(frozen=True)
 class AutomaticSLIM:
-    """SLIM along the automatic cut, grown and kept one to one: ParaPointSLIM without ParaPoint.
+    """SLIM along the automatic cut, grown and kept one to one.
 
     Held against that one it tells what the learned seam is worth, and what a longer seam is.
 
@@ -259,7 +257,7 @@ class _Run:
         20 with the learned seam and 22 without one, and 7.8 and 19 with this start.
 
         Args:
-            uv: (V, 2) ParaPoint's map; it is brought to the scale of the surface.
+            uv: (V, 2) the computed map; it is brought to the scale of the surface.
         """
         self.start, self.uv = self._isometric()
         self.energy = self._energy(self.uv)
@@ -267,7 +265,7 @@ class _Run:
             uv = uv * (self.unit / np.sqrt(areas.sum()))
             energy = self._energy(uv)
             if energy < self.energy and len(crossing_vertices(self.mesh, uv)) == 0:
-                self.start, self.uv, self.energy = "parapoint", uv, energy
+                self.start, self.uv, self.energy = "computed", uv, energy
 
     def _isometric(self) -> tuple[str, FloatArray]:
         """The name of the start, and a map (V, 2) of small energy; Tutte's where that fails."""

@@ -48,7 +48,8 @@ METHODS: dict[str, str] = {
     "artist+slim": "baselines.hybrid:ArtistSLIM",
     "meshed": "baselines.meshed:Meshed",
     "external": "baselines.tools.external:External",
-    "parapoint": "parapoint.estimator:ParaPoint",
+    "parapoint": "parapoint.learned.parapoint:ParaPoint",
+    "computed": "parapoint.computed.computed_map:ComputedMap",
     "fam": "baselines.neural.fam:FAM",
     "nuvo": "baselines.neural.nuvo:Nuvo",
 }

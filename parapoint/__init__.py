@@ -10,14 +10,16 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from parapoint.computed.computed_map import ComputedMap
     from parapoint.errors import InputError
-    from parapoint.estimator import ParaPoint
+    from parapoint.learned.parapoint import ParaPoint
     from parapoint.method import Method
     from parapoint.surfaces.parameterization import Parameterization, PointParameterization
     from parapoint.surfaces.surface import Mesh, PointCloud
 
 __version__ = "0.1.0"
 __all__ = [
+    "ComputedMap",
     "InputError",
     "Mesh",
     "Method",
@@ -28,10 +30,11 @@ __all__ = [
 ]
 
 LAZY = {
+    "ComputedMap": "computed.computed_map",
     "InputError": "errors",
     "Mesh": "surfaces.surface",
     "Method": "method",
-    "ParaPoint": "estimator",
+    "ParaPoint": "learned.parapoint",
     "Parameterization": "surfaces.parameterization",
     "PointCloud": "surfaces.surface",
     "PointParameterization": "surfaces.parameterization",

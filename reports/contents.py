@@ -47,7 +47,8 @@ DISPLAY: dict[str, tuple[str, str]] = {
     "fam": ("FAM", ""),
     "artist+slim": ("Artist's cut + SLIM", ""),
     "automatic+slim": ("Automatic cut + SLIM", ""),
-    "parapoint+slim": ("ParaPoint + SLIM", ""),
+    "parapoint+slim": ("Computed cut + SLIM", ""),
+    "computed": ("Computed map", ""),
     "parapoint": ("ParaPoint", ""),
 }
 """Name of a method in print and, where its parameters do not say it, what it minimises.

@@ -70,9 +70,10 @@ def training_rates() -> list[Rate]:
     """The matrix product, training steps of two presets, and the mapping of 250,000 points."""
     import torch
 
-    from parapoint.estimator import BATCH, ParaPoint
     from parapoint.learned.networks import SubNetworks, cost, products
+    from parapoint.learned.parapoint import ParaPoint
     from parapoint.learned.presets import PRESETS
+    from parapoint.learned.trained_map import BATCH, TrainedMap
     from parapoint.learned.trainer import Trainer
 
     left = torch.rand(PRODUCT, PRODUCT)
@@ -82,7 +83,7 @@ def training_rates() -> list[Rate]:
     rows = [Rate(what, wall, cpu, product.operations / cpu / 1e9, 1.0, np.nan)]
     points = np.random.default_rng(0).normal(size=(max(STEPS), 3))
     points /= np.linalg.norm(points, axis=1, keepdims=True)
-    for preset in ("paper", "smooth"):
+    for preset in PRESETS:
         for count in STEPS:
             numbers = replace(PRESETS[preset], subset=count, warm_up=0.0)
             trainer = Trainer(points[:count], numbers, seed=0, device="cpu")
@@ -95,9 +96,11 @@ def training_rates() -> list[Rate]:
             step = Work(partial(next, steps), operations)
             rows.append(_rate(f"step of {preset}, {count} points", step, layers, product))
         model = ParaPoint(preset=preset, iterations=1, points=256, device="cpu").fit(points)
-        assert isinstance(model.networks_, SubNetworks)
+        assert isinstance(model.map_, TrainedMap)
+        networks = model.map_.networks
+        assert isinstance(networks, SubNetworks)
         dense = np.resize(points, (MAPPED, 3))
-        operations = 2 * MAPPED * (cost(model.networks_.cut) + cost(model.networks_.unwrap))
+        operations = 2 * MAPPED * (cost(networks.cut) + cost(networks.unwrap))
         layers = _products(numbers.hidden, BATCH["cpu"], backward=False)
         mapping = Work(partial(model.transform, dense), operations)
         rows.append(_rate(f"mapping of {MAPPED:,} points, {preset}", mapping, layers, product))

@@ -1,4 +1,4 @@
-"""A nearly conformal map of a bare cloud with short seams, computed: the `fast` preset starts here.
+"""A nearly conformal map of a bare cloud with short seams, computed without training.
 
 The cloud is triangulated, cut, and flattened by a bijective map. The cuts lead to where the scale
 of a conformal map, found by a linear solve, is most extreme (as in Sawhney and Crane 2017,

@@ -234,8 +234,8 @@ class Trainer:
 
     def _start_ends(self) -> bool:
         """Whether one of several starts is done."""
-        ends = (self._start + 1) * self.preset.start_share
-        return 1 < self.starts > self._start and self.progress >= ends
+        share = self.preset.start_share
+        return 1 < self.starts > self._start and round(self.progress / share, 9) >= self._start + 1
 
     def _next_start(self) -> None:
         """Begin the next start; after the last one go on with the best."""

@@ -13,12 +13,12 @@ import trimesh
 from PIL import Image
 
 from benchmarks.store.results import ResultRow
-from parapoint.cli import checkerboard
 from parapoint.errors import InputError
 from parapoint.files.surfaces import complete_file, write_obj
 from parapoint.sources import source_hash
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh
+from parapoint.textures.checkerboard import checkerboard
 from reports.contents import Contents
 from reports.pictures.drawing import known_keys, slug
 

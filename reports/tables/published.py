@@ -18,7 +18,7 @@ AUTHORS = ("SLIM", "ParaPoint", "FAM")
 
 SAME_METHOD = {
     "SLIM": ("slim", {"energy": "symmetric_dirichlet"}),
-    "ParaPoint": ("parapoint", {}),
+    "ParaPoint": ("parapoint", {"preset": "paper"}),
     "FAM": ("fam", {}),
 }
 """The method here, and the parameters it must have, that a published figure speaks of."""

@@ -1,19 +1,15 @@
 import json
 import logging
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 
-from parapoint import InputError, ParaPoint, PointCloud, estimator
-from parapoint.computed.flattening import FlatMap, flat_map
-from parapoint.computed.reconstruction import ReconstructionError
+from parapoint import InputError, ParaPoint, PointCloud
 from parapoint.learned import presets
 from parapoint.learned.networks import Networks
 from parapoint.learned.presets import PRESETS
-from parapoint.learned.trainer import Trainer
 from parapoint.testing import check_method
 
 TINY = {"preset": "paper", "points": 150, "subset": 100, "iterations": 6, "device": "cpu"}
@@ -50,16 +46,18 @@ def test_parameters_follow_scikit_learn() -> None:
 
 
 def test_none_takes_the_preset_s_value() -> None:
-    model = ParaPoint(preset="paper")
-    assert model._checked()[0] == PRESETS["paper"]
-    changed = ParaPoint(preset="paper", distortion="isometric", distortion_weight=1e-4)._checked()
-    assert (changed[0].distortion, changed[0].distortion_weight) == ("isometric", 1e-4)
+    assert ParaPoint(preset="paper").numbers() == PRESETS["paper"]
+    changed = ParaPoint(preset="paper", distortion="isometric", distortion_weight=1e-4).numbers()
+    assert (changed.distortion, changed.distortion_weight) == ("isometric", 1e-4)
 
 
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"preset": "best"}, "no preset 'best'; there are: paper"),
+        ({"preset": "best"}, "no preset 'best'; there are: paper, learned"),
+        ({"preset": "computed"}, "no preset 'computed': it is a method of its own: ComputedMap"),
+        ({"preset": "fast"}, "no preset 'fast': the computed map is a method of its own"),
+        ({"preset": "smooth"}, "no preset 'smooth': it is called \"learned\" now"),
         ({"points": 50}, "points must be a whole number of at least 100, not 50"),
         ({"iterations": 0}, "iterations must be"),
         ({"iterations": 2.5}, "iterations must be"),
@@ -68,7 +66,7 @@ def test_none_takes_the_preset_s_value() -> None:
         ({"distortion_weight": -0.1}, "distortion_weight must be a number of at least 0"),
         ({"distortion": "authalic"}, "distortion must be one of conformal, isometric"),
         ({"branches": "4d"}, "branches must be one of both, 3d, 2d"),
-        ({"all_from": 1.5}, "all_from must lie between 0 and 1"),
+        ({"all_from": 1.5}, "all_from must be a number of at least 0 and at most 1"),
         ({"seed": -1}, "seed must be"),
         ({"device": "abacus"}, "device must be auto, cpu or cuda"),
     ],
@@ -128,7 +126,7 @@ def test_transform_goes_in_batches(fitted: ParaPoint, monkeypatch) -> None:
         return keep(self, x)
 
     monkeypatch.setattr(Networks, "parameterization", counted)
-    monkeypatch.setattr("parapoint.estimator.BATCH", {"cpu": 256})
+    monkeypatch.setattr("parapoint.learned.trained_map.BATCH", {"cpu": 256})
     # Products of other sizes round differently, in float32.
     np.testing.assert_allclose(fitted.transform(points), whole, rtol=1e-4, atol=1e-4)
     assert sizes == [256, 256, 188]
@@ -138,9 +136,10 @@ def test_transform_goes_in_batches(fitted: ParaPoint, monkeypatch) -> None:
 def test_the_inverse_is_the_networks_own(fitted: ParaPoint) -> None:
     uv = fitted.transform(paraboloid())
     with torch.no_grad():
-        raw = fitted.networks_.surface(torch.from_numpy(uv / fitted.scale_).float()).numpy()
+        inside = torch.from_numpy(uv / fitted.frame_.scale).float()
+        raw = fitted.map_.networks.surface(inside).numpy()
     points = fitted.inverse_transform(uv)
-    np.testing.assert_allclose(points, raw * fitted.scale_ + fitted.centre_, rtol=1e-5)
+    np.testing.assert_allclose(points, fitted.frame_.outside(raw), rtol=1e-5)
 
 
 def test_seams_are_where_neighbours_are_far_apart_in_the_plane(fitted, monkeypatch) -> None:
@@ -171,7 +170,7 @@ def test_a_saved_model_maps_as_before(fitted: ParaPoint, tmp_path) -> None:
     fitted.save(tmp_path)
     loaded = ParaPoint.load(tmp_path, device="cpu")
     assert loaded == fitted
-    assert loaded.preset_ == fitted.preset_
+    assert loaded.map_.preset == fitted.map_.preset
     assert np.array_equal(loaded.transform(paraboloid()), fitted.transform(paraboloid()))
     assert np.array_equal(loaded.seams(), fitted.seams())
     assert [t.values for t in loaded.trace_] == [t.values for t in fitted.trace_]
@@ -185,7 +184,7 @@ def test_a_model_of_another_version_or_a_damaged_one_is_one_line(fitted, tmp_pat
     fitted.save(tmp_path)
     text = (tmp_path / "model.json").read_text()
     (tmp_path / "model.json").write_text(json.dumps({**json.loads(text), "format": 99}))
-    with pytest.raises(InputError, match="format version 99; this parapoint reads version 4"):
+    with pytest.raises(InputError, match="format version 99; this parapoint reads version 5"):
         ParaPoint.load(tmp_path)
     (tmp_path / "model.json").write_text(text[:-20])
     with pytest.raises(InputError, match="damaged"):
@@ -209,164 +208,6 @@ def test_a_model_that_names_tensors_elsewhere_is_refused(fitted, tmp_path) -> No
             ParaPoint.load(tmp_path / "model")
 
 
-FAST = {"preset": "fast", "iterations": 3, "device": "cpu"}
-
-
-@pytest.fixture(scope="module")
-def computed() -> ParaPoint:
-    return ParaPoint(**FAST).fit(paraboloid())
-
-
-def test_the_fast_map_is_computed_and_its_inverse_undoes_it(computed: ParaPoint) -> None:
-    points = paraboloid()
-    assert computed.report_["map"] == "computed"
-    assert computed.report_["anchors"] == 400
-    assert computed.report_["found"]["boundary_loops"] == 1
-    uv = computed.transform(points)
-    np.testing.assert_allclose(computed.inverse_transform(uv), points, atol=1e-4)
-    # Points between the anchors come back near where they were: 7 is the radius.
-    inner = np.abs(paraboloid(3000)[:, :2] - [10, -5]).max(axis=1) < 6
-    dense = paraboloid(3000)[inner]
-    back = computed.inverse_transform(computed.transform(dense))
-    assert np.linalg.norm(back - dense, axis=1).max() < 0.02 * computed.scale_
-
-
-def test_dense_points_of_a_plane_are_mapped_isometrically() -> None:
-    plane = paraboloid() * [1, 1, 0]
-    model = ParaPoint(**FAST).fit(plane)
-    dense = paraboloid(900)[400:] * [1, 1, 0]
-    uv = model.transform(dense)
-    apart = np.linalg.norm(dense[:, None] - dense, axis=2)
-    np.testing.assert_allclose(np.linalg.norm(uv[:, None] - uv, axis=2), apart, atol=1e-4)
-
-
-def test_training_after_the_start_leaves_the_fast_map_as_it_is(computed: ParaPoint) -> None:
-    longer = ParaPoint(**{**FAST, "iterations": 9}).fit(paraboloid())
-    assert np.array_equal(longer.transform(paraboloid()), computed.transform(paraboloid()))
-    uv = computed.transform(paraboloid())
-    assert np.array_equal(longer.inverse_transform(uv), computed.inverse_transform(uv))
-    deform = longer.networks_.deform.embed.layers[0]
-    assert not torch.equal(deform, computed.networks_.deform.embed.layers[0])
-    assert longer.trace_[-1].iteration == 9
-
-
-def test_a_computed_map_stays_where_training_diverges(
-    computed: ParaPoint, monkeypatch, caplog
-) -> None:
-    monkeypatch.setattr(Trainer, "_step", lambda _: {"total": math.nan})
-    model = ParaPoint(**FAST).fit(paraboloid())
-    assert np.array_equal(model.transform(paraboloid()), computed.transform(paraboloid()))
-    assert model.report_["divergences"] == 2
-    assert "training diverged twice" in caplog.text
-
-
-def test_a_saved_fast_model_maps_as_before(computed: ParaPoint, tmp_path) -> None:
-    computed.save(tmp_path)
-    loaded = ParaPoint.load(tmp_path, device="cpu")
-    dense = paraboloid(700)
-    assert np.array_equal(loaded.transform(dense), computed.transform(dense))
-    uv = computed.transform(dense)
-    assert np.array_equal(loaded.inverse_transform(uv), computed.inverse_transform(uv))
-    assert loaded.report_ == json.loads(json.dumps(computed.report_))
-
-
-def test_a_cloud_that_shows_no_surface_is_trained_instead_and_says_so(caplog) -> None:
-    parts = [paraboloid(150) + np.array([100.0 * k, 0, 0]) for k in range(3)]
-    with caplog.at_level(logging.WARNING, logger="parapoint"):
-        model = ParaPoint(**{**FAST, "iterations": 2}).fit(np.concatenate(parts))
-    assert "one is trained: the largest component holds 150 of 450" in caplog.text
-    assert model.report_["map"] == "trained"
-    assert "150 of 450" in model.report_["map_not_computed"]
-    assert model.preset_ == replace(PRESETS["smooth"], iterations=2)
-    assert isinstance(model.networks_, Networks)
-
-
-def test_points_off_the_surface_are_counted_and_mapped(caplog) -> None:
-    points = np.concatenate([paraboloid(), paraboloid(100) + np.array([500.0, 0, 0])])
-    with caplog.at_level(logging.WARNING, logger="parapoint"):
-        model = ParaPoint(**FAST).fit(points)
-    assert "100 of 500 points are not on the surface that was found" in caplog.text
-    assert np.isfinite(model.transform(points)).all()
-
-
-def test_points_that_nearly_coincide_count_once() -> None:
-    points = paraboloid()
-    noise = 1e-9 * np.random.default_rng(1).normal(size=points.shape)
-    model = ParaPoint(**FAST).fit(np.concatenate([points, points + noise]))
-    assert model.report_["map"] == "computed"
-    assert 400 <= model.report_["anchors"] <= 402  # a pair may lie on two sides of a rounding
-
-
-class Clock:
-    """Runs only while maps are computed: `pace` seconds a point, `slow` after the first map."""
-
-    def __init__(self, monkeypatch, pace: float, slow: float | None = None) -> None:
-        self.now, self.counts, self.change = 100.0, [], lambda flat: flat
-
-        def timed(points: np.ndarray, _: float) -> FlatMap:
-            self.counts.append(len(points))
-            is_first = len(self.counts) == 1
-            self.now += len(points) * (pace if is_first or slow is None else slow)
-            flat = flat_map(points)
-            return flat if is_first else self.change(flat)
-
-        monkeypatch.setattr(estimator.time, "monotonic", lambda: self.now)
-        monkeypatch.setattr(estimator.time, "perf_counter", lambda: self.now)
-        monkeypatch.setattr(estimator, "flat_map", timed)
-
-
-def test_a_time_budget_allows_as_many_computed_points_as_the_first_map_shows(monkeypatch) -> None:
-    clock = Clock(monkeypatch, pace=0.004)
-    model = ParaPoint(**FAST, time_budget=4.0).fit(paraboloid(700))
-    # 200 points take 0.8 s; the descents end after 3.2 s, and 55 % of what is left are planned.
-    assert clock.counts == [200, 330]
-    assert model.report_["anchors"] == model.report_["points"] == 330
-    assert not model.report_["cut_short"]
-
-
-def test_on_a_busy_machine_the_first_map_stays(monkeypatch) -> None:
-    clock = Clock(monkeypatch, pace=0.01)
-    model = ParaPoint(**FAST, time_budget=4.0).fit(paraboloid(700))
-    assert clock.counts == [200]
-    assert len(model.points_) == model.report_["anchors"] == 200
-
-
-def sheared(flat: FlatMap) -> FlatMap:
-    shear = np.diag([4.0, 1.0])
-    return flat._replace(uv=flat.uv @ shear, jacobians=shear @ flat.jacobians)
-
-
-@pytest.mark.parametrize(("change", "points"), [(lambda flat: flat, 330), (sheared, 200)])
-def test_a_map_that_is_cut_short_stays_where_it_is_the_better(
-    change, points: int, monkeypatch, caplog
-) -> None:
-    clock = Clock(monkeypatch, pace=0.004, slow=0.1)
-    clock.change = change
-    model = ParaPoint(**FAST, time_budget=4.0).fit(paraboloid(700) * [1, 1, 0])
-    assert clock.counts == [200, 330]
-    assert model.report_["points"] == model.report_["anchors"] == points
-    assert model.report_["cut_short"]
-    assert f"the time was up before the map was at its best; it is of {points}" in caplog.text
-
-
-def test_a_second_map_that_fails_leaves_the_first(monkeypatch, caplog) -> None:
-    def failed(_: FlatMap) -> FlatMap:
-        raise ReconstructionError("no surface")
-
-    Clock(monkeypatch, pace=0.004).change = failed
-    model = ParaPoint(**FAST, time_budget=4.0).fit(paraboloid(700))
-    assert model.report_["points"] == model.report_["anchors"] == 200
-    assert "no map of 330 points could be computed: no surface" in caplog.text
-
-
-def test_a_budget_that_is_spent_at_once_still_gives_a_map() -> None:
-    model = ParaPoint(**FAST, time_budget=1e-3).fit(paraboloid())
-    assert model.report_["map"] == "computed"
-    assert model.report_["cut_short"]
-    uv = model.transform(paraboloid())
-    assert np.linalg.matrix_rank(uv - uv.mean(axis=0)) == 2
-
-
 def test_rows_that_were_left_out_are_counted_over_all_components(caplog) -> None:
     points = np.concatenate([paraboloid(), paraboloid()[:30]])
     cloud = PointCloud(np.concatenate([points, points + 1e3]), dropped=7)
@@ -377,25 +218,19 @@ def test_rows_that_were_left_out_are_counted_over_all_components(caplog) -> None
     assert "60 of 860 points repeat others and count once" in caplog.text
 
 
-@pytest.mark.parametrize("branches", ["3d", "2d"])
-def test_the_branches_of_a_computed_map_can_be_left_out(branches: str) -> None:
-    model = ParaPoint(**FAST, branches=branches).fit(paraboloid())
-    assert model.report_["iterations"] == 3
-
-
 class KilledError(Exception):
     pass
 
 
 def test_a_killed_fit_goes_on_where_it_was(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr("parapoint.learned.saving.CHECKPOINT_SECONDS", 0.0)
+    monkeypatch.setattr("parapoint.learned.checkpoint.CHECKPOINT_SECONDS", 0.0)
     points = paraboloid()
     whole = ParaPoint(**TINY).fit(points)
     seen = []
 
     def kill(progress) -> None:
-        seen.append(progress.step.iteration)
-        if progress.step.iteration == 4:
+        seen.append(progress.iteration)
+        if progress.iteration == 4:
             raise KilledError
 
     with pytest.raises(KilledError):
@@ -405,7 +240,7 @@ def test_a_killed_fit_goes_on_where_it_was(tmp_path, monkeypatch) -> None:
     with pytest.raises(InputError, match="other points or settings"):
         ParaPoint(**{**TINY, "seed": 1}).fit(points, checkpoint=tmp_path)
     model = ParaPoint(**TINY).fit(
-        points, checkpoint=tmp_path, callback=lambda now: seen.append(now.step.iteration)
+        points, checkpoint=tmp_path, callback=lambda now: seen.append(now.iteration)
     )
     assert seen == [5, 6]
     assert np.array_equal(model.transform(points), whole.transform(points))
@@ -420,20 +255,15 @@ def test_a_time_budget_ends_the_fit() -> None:
 
 
 def test_the_time_that_remains_is_told_by_the_pace_of_the_steps(monkeypatch) -> None:
-    clock = Clock(monkeypatch, pace=0.004)
-    told = []
+    now, told = [100.0], []
+    monkeypatch.setattr("parapoint.learned.trainer.time.perf_counter", lambda: now[0])
 
     def tell(progress) -> None:
         told.append(round(progress.remaining, 3))
-        clock.now += 0.5  # which is the next step's
+        now[0] += 0.5  # which is the next step's
 
-    ParaPoint(**{**FAST, "iterations": 10}).fit(paraboloid(700), callback=tell)
-    # The 2.8 s that the map takes are no step's.
+    ParaPoint(**{**TINY, "iterations": 10}).fit(paraboloid(), callback=tell)
     assert told == [0.0, *(round(0.5 * k / (k + 1) * (9 - k), 3) for k in range(1, 10))]
-    told.clear()
-    clock.now, clock.counts = 100.0, []
-    ParaPoint(**{**FAST, "iterations": 100}, time_budget=2.0).fit(paraboloid(700), callback=tell)
-    assert told[1] == pytest.approx(2.0 - 0.4 - 0.66 - 0.5)  # two maps and a step
 
 
 def test_the_report_and_the_trace_say_what_was_done() -> None:

@@ -59,7 +59,8 @@ DEPENDENCIES = {
     "parapoint/surfaces/surface.py": "benchmarks.metrics.table",
     "benchmarks/metrics/overlap.py": "benchmarks.metrics.table",
     "parapoint/files/point_formats.py": "parapoint.files.surfaces",
-    "parapoint/learned/losses.py": "baselines.hybrid",
+    "parapoint/learned/losses.py": "parapoint.learned.parapoint",
+    "parapoint/computed/scale.py": "baselines.hybrid",
     "baselines/disks/tutte.py": "baselines.disks.slim",
     "reports/pictures/render.py": "reports.pictures.drawing",
 }

@@ -19,8 +19,8 @@ def test_labels_name_energy_iterations_and_only_what_differs(tmp_path):
     found = labels(
         rows(
             tmp_path,
-            ("parapoint", {"preset": "fast", "points": None, "lr": 0.1}, {}),
-            ("parapoint", {"preset": "fast", "points": None, "lr": 0.2}, {}),
+            ("parapoint", {"preset": "paper", "points": None, "lr": 0.1}, {}),
+            ("parapoint", {"preset": "paper", "points": None, "lr": 0.2}, {}),
             ("slim", {**one, "iterations": 20}, {}),
             ("slim", one, {}),
             ("slim", {"energy": "conformal", "iterations": 20}, {}),
@@ -40,7 +40,7 @@ def test_labels_name_energy_iterations_and_only_what_differs(tmp_path):
     assert [label.text for label in found.values()][1] == (
         "SLIM (symmetric Dirichlet, 20 iterations)"
     )
-    assert [label.text for label in found.values()][-1] == "ParaPoint (fast, 0.2 lr)"
+    assert [label.text for label in found.values()][-1] == "ParaPoint (paper, 0.2 lr)"
 
 
 def test_variants_are_told_by_their_change_and_the_default_by_its_report(tmp_path):

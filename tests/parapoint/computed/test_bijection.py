@@ -161,3 +161,24 @@ def test_the_descents_end_with_the_time_and_leave_what_they_have(monkeypatch) ->
     none = bijective_map(mesh, None, deadline=0.0)
     size = np.sqrt(mesh.face_areas.sum() / igl.doublearea(tutte(mesh), mesh.faces).sum() * 2)
     np.testing.assert_allclose(none, size * tutte(mesh))
+
+
+def test_a_map_is_at_the_layout_when_it_is_that_and_not_merely_near(monkeypatch) -> None:
+    # Of a flat square the layout is the square itself. The first descent is held up at Tutte's
+    # embedding, a disk whose energy exceeds the square's by less than 10 times the least: that is
+    # near, not there, so the map sets out again and comes to the square.
+    x, y = np.meshgrid(np.linspace(0, 1, 9), np.linspace(0, 1, 9))
+    mesh = Mesh(np.column_stack([x.ravel(), y.ravel(), np.zeros(81)]), grid(9, 9))
+    start = tutte(mesh) / np.sqrt(np.pi)
+    assert 0.1 < bijection._excess(mesh, start, igl.SYMMETRIC_DIRICHLET) < 10
+    descended, calls = bijection._descended, []
+
+    def held_up_once(of, uv, *rest):
+        calls.append(uv)
+        return uv if len(calls) == 1 else descended(of, uv, *rest)
+
+    monkeypatch.setattr(bijection, "_descended", held_up_once)
+    led = bijection._led(mesh, mesh, start, np.inf)
+    i, j = mesh.edges.T
+    lengths = [np.linalg.norm(of[i] - of[j], axis=1) for of in (mesh.vertices, led)]
+    np.testing.assert_allclose(lengths[1], lengths[0], rtol=0.02)

@@ -2,8 +2,10 @@ import numpy as np
 import pytest
 
 from benchmarks.cases.builtin import sphere, torus
-from parapoint.computed.flattening import FlatMap, flat_map
+from parapoint.computed.flattening import FlatMap, _chosen_copies, _scale_cuts, flat_map
 from parapoint.computed.reconstruction import ReconstructionError
+from parapoint.surfaces.cutting import cut_along
+from parapoint.surfaces.surface import Mesh
 
 SPHERE, TORUS = sphere().vertices, torus().vertices
 
@@ -98,3 +100,76 @@ def test_points_without_a_surface_are_refused() -> None:
     parts = [SPHERE[::4] + np.array([4.0 * k, 0, 0]) for k in range(3)]
     with pytest.raises(ReconstructionError, match="holds 161 of 483 points"):
         flat_map(np.concatenate(parts))
+
+
+def test_a_tube_is_slit_along_its_side_and_unrolled() -> None:
+    # 24 columns and 9 rows at distance 1. Its two ends turn by 0 in the flat metric, not by 2π and
+    # −2π, so eight edges join them, and it becomes a rectangle, not a ring: all steps along it and
+    # around it stay 1, but for one in each row, which leads from one side to the other, 23 back.
+    # The ends of the seam, in the first and the last row, may be on either side.
+    ring, row = (of.ravel() for of in np.indices((24, 9)))
+    turn, radius = 2 * np.pi * ring / 24, 1 / (2 * np.sin(np.pi / 24))
+    flat = flat_map(np.stack([radius * np.cos(turn), radius * np.sin(turn), row], axis=1))
+    assert flat.facts["boundary_loops"] == 2
+    assert flat.facts["seam_edges"] == 8
+    uv = flat.uv.reshape(24, 9, 2)[:, 1:-1]
+    along = np.linalg.norm(np.diff(uv, axis=1), axis=2)
+    around = np.sort(np.linalg.norm(np.roll(uv, -1, axis=0) - uv, axis=2), axis=0)
+    np.testing.assert_allclose(along, 1, atol=1e-6)
+    np.testing.assert_allclose(around[:-1], 1, atol=1e-6)
+    np.testing.assert_allclose(around[-1], 23, atol=1e-6)
+
+
+def plate_with_pins(side: int, pins: list[tuple[int, int]]) -> Mesh:
+    """A square of side² vertices, with a tube of six sides and rows on each vertex given."""
+    x, y = (of.ravel() for of in np.meshgrid(np.arange(side), np.arange(side)))
+    corner = (side * np.arange(side - 1)[:, None] + np.arange(side - 1)).ravel()
+    faces = np.concatenate(
+        [corner[:, None] + [0, 1, side + 1], corner[:, None] + [0, side + 1, side]]
+    )
+    plate, count = np.stack([x, y, 0 * x], axis=1), side**2
+    points = [plate]
+    for middle, rows in pins:
+        faces = faces[(faces != middle).all(axis=1)]
+        below = middle + np.array([-side - 1, -side, 1, side + 1, side, -1])
+        foot = plate[below]
+        for height in range(1, rows + 1):
+            above, count = count + np.arange(6), count + 6
+            points.append(foot + np.array([0, 0, height]))
+            to, up = np.roll(below, -1), np.roll(above, -1)
+            walls = np.stack([below, to, up], axis=1), np.stack([below, up, above], axis=1)
+            faces, below = np.concatenate([faces, *walls]), above
+        plate[middle, 2] = rows
+        tip = np.stack([below, np.roll(below, -1), np.full(6, middle)], axis=1)
+        faces = np.concatenate([faces, tip])
+    return Mesh(np.concatenate(points), faces)
+
+
+def test_of_two_pins_that_is_cut_whose_cut_gains_more_for_each_edge() -> None:
+    # A pin's area goes by its rows: 24 and 14. A cut to its tip takes these, two edges over the tip
+    # and its foot, and the way from the rim: 24 + 10 = 34 and 14 + 2 = 16. So the high pin gains
+    # 24 / 34 an edge and the low one more, 14 / 16, though all in all less. There the cut goes
+    # first, and it makes the scale even enough.
+    mesh = plate_with_pins(21, [(10 * 21 + 10, 24), (10 * 21 + 3, 14)])
+    cut = _scale_cuts(mesh, 34)
+    copied = cut.vertices[len(mesh.vertices) :]
+    assert len(copied) == 16
+    assert (copied[:, 0] <= 4).all()
+
+
+def test_a_toothed_seam_runs_between_two_rows_of_points() -> None:
+    # The slit goes up columns 5 and 6 of a grid whose cells have a diagonal up to the right. With
+    # column 5 on its left bank and 6 on its right the seam is crossed by the two edges to the right
+    # of each of (5, 0) to (5, 3), less the slit's last edge: 7. With one bank for all it is 10.
+    x, y = (of.ravel() for of in np.meshgrid(np.arange(11), np.arange(11)))
+    corner = (11 * np.arange(10)[:, None] + np.arange(10)).ravel()
+    faces = np.concatenate([corner[:, None] + [0, 1, 12], corner[:, None] + [0, 12, 11]])
+    mesh = Mesh(np.stack([x, y, 0 * x], axis=1), faces)
+    path = np.array([5, 16, 28, 27, 39, 38, 50])  # (5, 0), (5, 1), (6, 2), (5, 2), (6, 3), ...
+    disk = cut_along(mesh, np.stack([path[:-1], path[1:]], axis=1))
+    origin = np.empty(len(disk.vertices), dtype=np.int64)
+    origin[disk.faces] = mesh.faces
+    chosen = _chosen_copies(disk, origin)
+    joined = set(map(tuple, np.sort(disk.edges, axis=1).tolist()))
+    images = map(tuple, np.sort(chosen[mesh.edges], axis=1).tolist())
+    assert sum(pair not in joined for pair in images) == 7

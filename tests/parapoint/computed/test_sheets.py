@@ -7,8 +7,8 @@ from scipy.spatial import Delaunay, cKDTree
 from parapoint.computed import reconstruction
 from parapoint.computed.delaunay import delaunay_complex, empty_radii
 from parapoint.computed.reconstruction import triangulation
-from parapoint.computed.sheets import sheet_normals, sheet_triangles
-from parapoint.surfaces.surface import Mesh
+from parapoint.computed.sheets import _signs, sheet_normals, sheet_triangles
+from parapoint.surfaces.surface import Mesh, unit_normals
 
 SIDE = 24
 
@@ -83,3 +83,25 @@ def test_a_front_goes_through_a_crossing(monkeypatch: pytest.MonkeyPatch) -> Non
     assert leaps(around) > 60
     assert leaps(through) < 0.7 * leaps(around)
     assert through.referenced.mean() > 0.99
+
+
+def test_normals_of_a_circle_agree_though_they_turn() -> None:
+    # Point 1 has a link along x to point 0, whose normal is its own mirrored, as 60 degrees apart
+    # on a circle: both rise by 1/2, so their cosine 1/2 counts as 1/2 + 2 (1/2)² = 1, and the bond
+    # is exp(−(0.5 / 0.2)²) = 2e-3. Against its own is the normal of point 2, on a link along y
+    # without rise: −(1/3)⁸ = −1.5e-4. So the link to 0 decides; by the bare cosine, which makes it
+    # (1/2)⁸ 2e-3 = 8e-6, that to 2 would. Points 0 and 2 are held by faces that turn as they do.
+    root = np.sqrt(3) / 2
+    away = np.arccos(-1 / 3) + np.pi / 6  # from z towards x
+    normals = np.array([[-0.5, 0, root], [0.5, 0, root], [np.sin(away), 0, np.cos(away)]])
+    points, faces = [[-1.0, 0, 0], [0.0, 0, 0], [0.0, 1, 0]], []
+    for corner in (0, 2):
+        x, y, z = normals[corner]
+        faces.append([corner, len(points), len(points) + 1])  # sides (z, 0, −x) and their cross
+        side = np.array([z, 0, -x])
+        points += [points[corner] + 0.1 * side, points[corner] + 0.1 * np.cross([x, y, z], side)]
+    normals = np.concatenate([normals, normals[[0, 0, 2, 2]]])
+    mesh = Mesh(np.array(points), np.array(faces))
+    np.testing.assert_allclose(unit_normals(mesh.vertices, mesh.faces), normals[[0, 2]], atol=1e-12)
+    signs = _signs(mesh.vertices, normals, np.array([[0, 1, 2]]), mesh)
+    assert signs.tolist() == [1] * 7

@@ -122,3 +122,30 @@ def test_anti_flip_loss_counts_neighbours_that_turn_away() -> None:
 def test_unfolding_loss_by_hand(J: list[list[float]], expected: float) -> None:
     images = tensor(J)[:, None].repeat(1, 3, 1)
     assert float(losses.unfolding_loss(images)) == pytest.approx(expected, abs=1e-6)
+
+
+def test_unwrap_loss_holds_the_box_fixed() -> None:
+    # As above: the pair at distance 0.25 is in each other's sum, 2 (1 − d) / 4 in all, so its two
+    # points have slopes ±1/2 along x. The other two, which span the box, are in no sum: were L(Q)
+    # not held fixed, a smaller box would lower the loss, and they would be drawn in.
+    uv = tensor([[0.0, 0.0], [0.25, 0.0], [4.0, 0.0], [0.0, 4.0]], requires_grad=True)
+    losses.unwrap_loss(uv, 2, 0.5).backward()
+    expected = tensor([[0.5, 0.0], [-0.5, 0.0], [0.0, 0.0], [0.0, 0.0]])
+    assert uv.grad is not None
+    torch.testing.assert_close(uv.grad, expected)
+
+
+@pytest.mark.parametrize("eigenvalues", losses.EIGENVALUES.values(), ids=losses.EIGENVALUES)
+@pytest.mark.parametrize("scale", [1e-5, 1e-3, 1e3])
+def test_values_and_gradients_of_a_map_scale_with_it(eigenvalues, scale: float) -> None:
+    """A map that starts a thousand times too small is judged as it would be at its size."""
+    at_one = torch.randn(2, 50, 3, generator=torch.Generator().manual_seed(0)).requires_grad_()
+    scaled = (scale * at_one.detach()).requires_grad_()
+    power = 2 if eigenvalues is losses.gram_eigenvalues else 1
+    for value, own in zip(eigenvalues(at_one), eigenvalues(scaled), strict=True):
+        torch.testing.assert_close(own / scale**power, value, rtol=1e-4, atol=1e-5)
+    losses.conformal_loss(*eigenvalues(at_one)).backward()
+    losses.conformal_loss(*eigenvalues(scaled)).backward()
+    torch.testing.assert_close(
+        scaled.grad / scale ** (power - 1), at_one.grad, rtol=1e-3, atol=1e-6
+    )

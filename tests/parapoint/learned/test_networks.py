@@ -204,3 +204,11 @@ def test_tangents_of_the_surface_are_unfolded() -> None:
         lambda p: net.parameterization(p[None])[0], points[3]
     )
     torch.testing.assert_close(there.unfolding[:, 3].T, jacobian[:, :2])
+
+
+def test_weights_start_uniform_within_one_over_the_root_of_the_inputs() -> None:
+    # 1 / √100 into the first layer, 1 / √4 into the second; of 404 and 100 draws the largest is
+    # within a tenth of the bound but for a chance of 0.9^100 < 1e-4.
+    first, second = Stack(100, 20, (4,), ACTIVATIONS["leaky_relu"], generator()).layers
+    assert 0.09 < float(first.detach().abs().max()) <= 0.1
+    assert 0.45 < float(second.detach().abs().max()) <= 0.5

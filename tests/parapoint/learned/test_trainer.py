@@ -6,10 +6,12 @@ import pytest
 import torch
 
 from parapoint.learned import losses, trainer
+from parapoint.learned.networks import Cycle, GridBranch
 from parapoint.learned.presets import PAPER
 from parapoint.learned.trainer import (
     DivergedError,
     Trainer,
+    objective_terms,
     oriented_normals,
     tangent_frames,
 )
@@ -76,6 +78,52 @@ def test_the_total_is_the_weighted_sum() -> None:
     assert terms["total"] == pytest.approx(expected, rel=1e-5)
 
 
+def several_starts(**changes: object) -> Trainer:
+    return tiny(starts=3, start_share=0.2, warm_up=0.1, all_from=1.0, **changes)
+
+
+def test_each_start_begins_the_schedule_anew_and_the_last_goes_on() -> None:
+    of = several_starts()
+    phases, rates = [], []
+    for step in of.run():
+        phases.append(step.phase)
+        rates.append(of._learning_rate())
+    # Of 40 steps three starts take 8 each; the one that goes on is then at 8 of 24.
+    hull, rest = ["hull"] * 3, ["subset"] * 5
+    assert phases == [*hull, *rest, *hull, *rest, *hull, *rest, *["subset"] * 16]
+    assert rates[:7] == pytest.approx(rates[8:15])
+    assert rates[16:23] == pytest.approx(rates[:7])
+    assert rates[23:] == pytest.approx(sorted(rates[23:], reverse=True))
+    assert rates[-1] == pytest.approx(1e-5)
+
+
+def test_the_start_of_lowest_loss_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    of = several_starts()
+    keep, ends, at_end = Trainer._step, {}, iter([3.0, 1.0, 2.0])
+
+    def step(self: Trainer) -> dict[str, float]:
+        terms = keep(self)
+        if self.iteration in (7, 15, 23):
+            ends[self._start] = weights(self)
+            return {**terms, "total": next(at_end)}
+        return {**terms, "total": 9.0}
+
+    monkeypatch.setattr(Trainer, "_step", step)
+    run = of.run()
+    states = [weights(of) for _ in zip(range(24), run, strict=False)]
+    assert np.array_equal(states[23], ends[1])
+    assert not np.array_equal(ends[0], ends[1])
+    # Each start has weights of its own, not those of the one before.
+    assert np.abs(states[7] - ends[0]).max() > 0.1
+    assert np.abs(states[15] - states[7]).max() > 0.1
+
+
+def test_networks_that_are_given_have_one_start() -> None:
+    of = several_starts()
+    given = Trainer(sphere(), of.preset, seed=0, device="cpu", networks=of.networks)
+    assert [step.phase for step in given.run()] == ["hull"] * 4 + ["subset"] * 36
+
+
 def test_the_learning_rate_follows_a_cosine() -> None:
     of = tiny()
     assert of._learning_rate() == pytest.approx(1e-3)
@@ -108,11 +156,13 @@ def test_the_same_seed_gives_the_same_weights_and_leaves_torch_s_generator_alone
     assert not np.array_equal(weights(other), weights(tiny()))
 
 
-def test_a_resumed_run_ends_as_one_that_was_not_stopped() -> None:
-    whole, first, second = tiny(), tiny(), tiny()
+@pytest.mark.parametrize("optimizer", ["adamw", "soap"])
+@pytest.mark.parametrize("stop", [2, 9, 17, 27])
+def test_a_resumed_run_ends_as_one_that_was_not_stopped(optimizer: str, stop: int) -> None:
+    whole, first, second = (several_starts(optimizer=optimizer, patch=4) for _ in range(3))
     list(whole.run())
     run = first.run()
-    for _ in range(17):
+    for _ in range(stop):
         next(run)
     tensors = {name: t.clone() for name, t in first.tensors().items()}
     second.resume(tensors, first.facts())
@@ -202,3 +252,27 @@ def test_the_unfolding_term_counts_only_with_a_weight() -> None:
     terms = next(of.run()).losses
     assert of.weights["unfolding"] == 0.1
     assert 0 <= terms["unfolding"] <= 2
+
+
+def test_the_last_phase_fills_the_time_that_its_own_steps_fit_in(monkeypatch) -> None:
+    # Steps of 4 s on the hull, which lasts until 5 of 20 s are over: two of them. Then steps of
+    # 1 s: 12 more fit. Judged by the longest step of the hull, the run would end after 9 of them.
+    times = iter([0.0, 4.0, *range(8, 40)])
+    monkeypatch.setattr(trainer.time, "perf_counter", lambda: float(next(times)))
+    preset = replace(TINY, warm_up=0.25, all_from=1.0)
+    of = Trainer(sphere(), preset, seed=0, device="cpu", time_budget=20.0)
+    steps = list(of.run())
+    assert [step.phase for step in steps] == ["hull"] * 2 + ["subset"] * 12
+    assert of.seconds == 20.0
+
+
+def test_the_wrapped_lattice_is_held_against_all_points() -> None:
+    # As in the tests of the losses: two points made, three given, 5 / 3 from given to made. Of the
+    # first two given points alone it would be (0 + 1) / 2.
+    made = torch.tensor([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    given = torch.tensor([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 5.0]])
+    uv, axes = made[:, :2], torch.eye(3)[:2, None].expand(2, 2, 3)
+    cycle = Cycle(None, GridBranch(uv, made, made, axes, made, uv))
+    terms = objective_terms(replace(PAPER, anti_flip_neighbours=1), cycle, given)
+    assert float(terms["wrap"]) == pytest.approx(5 / 3, rel=1e-5)
+    assert float(terms["cycle"]) == 0

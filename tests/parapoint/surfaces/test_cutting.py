@@ -3,7 +3,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from parapoint.errors import InputError
-from parapoint.surfaces.cutting import cut_along, cut_to_disk
+from parapoint.surfaces.cutting import cut_along, cut_to_disk, disk_cut
 from parapoint.surfaces.surface import Mesh
 from parapoint.testing import irregular_disk, sphere
 
@@ -157,3 +157,38 @@ def test_cut_along_keeps_nonmanifold_edges_joined():
 def test_cut_along_refuses_what_is_no_edge(edges):
     with pytest.raises(InputError, match=r"no edge of the mesh|shape \(n, 2\)"):
         cut_along(irregular_disk(), edges)
+
+
+def test_a_torus_is_cut_where_it_is_narrowest():
+    # Its tube has a radius from 1/4, at the first vertex, to 1/2, across. The vertex farthest from
+    # the first one is the first root, and the farthest from that the second: the first one, where
+    # the shortest loop goes around the tube. The rest of the cut is the polygon inside the torus.
+    i, j = np.divmod(np.arange(24 * 12), 12)
+    a, b = 2 * np.pi * i / 24, 2 * np.pi * j / 12
+    tube = 0.375 - 0.125 * np.cos(a)
+    radius = 1 + tube * np.cos(b)
+    points = np.stack([radius * np.cos(a), radius * np.sin(a), tube * np.sin(b)], axis=1)
+    mesh = Mesh(points, torus().faces)
+    inside = points[j == 6]
+    meridian = 12 * 2 * 0.25 * np.sin(np.pi / 12)
+    equator = np.linalg.norm(inside - np.roll(inside, 1, axis=0), axis=1).sum()
+    assert cut_length(mesh, cut_to_disk(mesh)) <= meridian + equator + 1e-9
+
+
+def test_a_later_arc_starts_from_an_earlier_one():
+    # A square of unit costs, where only (8, 0) to (8, 1) leads from the rim, all other ways there
+    # and all diagonals cost 100. Five steps lead from the rim to the hole at (8, 5), four from that
+    # path to the hole at (12, 2); without the path it would be six, to the rim or the other hole.
+    x, y = (of.ravel() for of in np.meshgrid(np.arange(17), np.arange(17)))
+    corner = (17 * np.arange(16)[:, None] + np.arange(16)).ravel()
+    faces = np.concatenate([corner[:, None] + [0, 1, 18], corner[:, None] + [0, 18, 17]])
+    points = np.stack([x, y, 0 * x], axis=1)
+    mesh = without_faces(Mesh(points, faces), [5 * 16 + 8, 2 * 16 + 12])
+    on_rim = ((points[:, :2] == 0) | (points[:, :2] == 16)).any(axis=1)
+    ends = mesh.edges
+    is_dear = (np.diff(points[ends], axis=1) != 0).sum(axis=(1, 2)) > 1
+    is_dear |= (on_rim[ends].sum(axis=1) == 1) & (ends != [8, 25]).any(axis=1)
+    cut = disk_cut(mesh, np.where(is_dear, 100.0, 1.0))
+    straight = [[8 + 17 * k, 25 + 17 * k] for k in range(5)]
+    aside = [[8 + k + 34, 9 + k + 34] for k in range(4)]
+    assert_array_equal(ends[cut], sorted(straight + aside))

@@ -1,0 +1,1 @@
+"""What the command `parapoint` offers, one file a command."""

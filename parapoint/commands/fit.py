@@ -1,0 +1,49 @@
+"""`parapoint fit`: find the map of a surface and save it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+
+from parapoint import saving
+from parapoint.commands.fitting import estimator_of, fitted, summary
+from parapoint.files.surfaces import read_surface
+
+
+@click.command()
+@click.argument("surface", metavar="INPUT")
+@click.option("--out", required=True, metavar="DIR", help="Folder of the model.")
+@click.option("--preset", default="computed", show_default=True, help="computed, learned or paper.")
+@click.option("--points", type=int, help="Most points that the map is fitted to.")
+@click.option("--iterations", type=int, help="Training steps.")
+@click.option("--subset", type=int, help="Points of a training step, before the last take all.")
+@click.option("--time-budget", type=float, metavar="S", help="Seconds of fitting at most.")
+@click.option("--distortion", help="Training: conformal, or isometric in its place.")
+@click.option("--distortion-weight", type=float, help="The paper has 1e-4 for complex shapes.")
+@click.option("--eigenvalues", help="Training: singular, or gram, as the paper is read.")
+@click.option("--branches", help="Training: both, or one: 3d (3D-2D-3D) or 2d (2D-3D-2D).")
+@click.option(
+    "--components",
+    default="together",
+    show_default=True,
+    help="One map of all, or of each or the largest component.",
+)
+@click.option("--seed", type=int, default=0, show_default=True)
+@click.option("--device", help="Training: auto, cpu or cuda.")
+@click.option("--threads", type=int, help="Training: processor threads.")
+@click.option("--json", "as_json", is_flag=True, help="Print the report as one JSON object.")
+def fit(surface: str, out: str, preset: str, as_json: bool, **settings: Any) -> None:
+    """Find the map of a mesh or a point cloud and save it in DIR.
+
+    The state of a training is saved there each minute: the same command goes on after a kill.
+    """
+    model = estimator_of(preset, settings)
+    for stem in ("model", "checkpoint"):
+        saving.check_free(Path(out), stem)
+    model = fitted(surface, read_surface(surface), model, checkpoint=out)
+    model.save(out)
+    report = {"model": out, "estimator": type(model).__name__, **model.report_}
+    print(json.dumps(report) if as_json else f"{out}: {summary(model)}")

@@ -1,0 +1,101 @@
+"""What the commands share: an estimator of the options, and its fit."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+from typing import Any
+
+import click
+
+from parapoint.commands.progress import bar
+from parapoint.errors import InputError
+from parapoint.estimator import Estimator
+from parapoint.surfaces.surface import Mesh, Surface
+
+logger = logging.getLogger("parapoint")
+
+PRESETS = ("computed", "learned", "paper")
+"""What `--preset` may say: the computed map, or ParaPoint by our training or by the paper's."""
+FALLBACK_SECONDS = 300.0
+"""Budget of the training that stands in where no map can be computed, if none was given."""
+
+
+def estimator_of(preset: str, settings: dict[str, Any]) -> Estimator:
+    """The estimator of a preset; settings that are None were not given.
+
+    Raises:
+        InputError: there is no such preset, or it does not use a setting that was given.
+    """
+    given = {name: value for name, value in settings.items() if value is not None}
+    if preset not in PRESETS:
+        raise InputError(f"--preset must be one of {', '.join(PRESETS)}, not {preset!r}")
+    if preset == "computed":
+        from parapoint.computed.computed_map import ComputedMap
+
+        own = {field.name for field in dataclasses.fields(ComputedMap)}
+        if unused := [name for name in given if name not in own]:
+            option = f"--{unused[0].replace('_', '-')}"
+            raise InputError(
+                f"{option} is not used by --preset computed; --preset learned and paper take it"
+            )
+        return ComputedMap(**given)
+    from parapoint.learned.parapoint import ParaPoint
+
+    return ParaPoint(preset, **given)
+
+
+def fitted(
+    path: str, surface: Surface, model: Estimator, *, checkpoint: str | None = None
+) -> Estimator:
+    """The model fitted to a surface under a progress bar.
+
+    Where no map can be computed, ParaPoint is trained in its place, and a warning says so.
+
+    Args:
+        path: the file of the surface, for messages.
+        surface: what is fitted.
+        model: an estimator.
+        checkpoint: folder of the state of a training, or None.
+
+    Raises:
+        InputError: the surface or a parameter is not as it has to be.
+    """
+    from parapoint.computed.reconstruction import ReconstructionError
+
+    count = surface.component_count if isinstance(surface, Mesh) else 1
+    if model.components == "together" and count > 1:
+        logger.warning(
+            "%d components: one map is fitted to all of them; --components each or largest "
+            "fits them apart",
+            count,
+        )
+    try:
+        with bar() as advance:
+            try:
+                return model.fit(surface, checkpoint=checkpoint, callback=advance)
+            except ReconstructionError as error:
+                logger.warning("no map could be computed, so one is trained: %s", error)
+                return _trained_instead(model).fit(surface, checkpoint=checkpoint, callback=advance)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    except RuntimeError as error:  # the training diverged
+        raise click.ClickException(f"{path}: {error}") from error
+
+
+def _trained_instead(model: Estimator) -> Estimator:
+    from parapoint.learned.parapoint import ParaPoint
+
+    return ParaPoint(
+        "learned",
+        time_budget=model.time_budget or FALLBACK_SECONDS,
+        components=model.components,
+        seed=model.seed,
+    )
+
+
+def summary(model: Estimator) -> str:
+    """What was done, in a few words."""
+    report = model.report_
+    steps = f"{report['iterations']} iterations" if "iterations" in report else "computed"
+    return f"{steps} in {report['seconds']} s"

@@ -1,0 +1,29 @@
+"""`parapoint map`: apply a saved map to other points of its surface."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+from parapoint.commands.output import check_target, write
+from parapoint.files.surfaces import read_surface
+
+
+@click.command("map")
+@click.argument("model", metavar="DIR")
+@click.argument("surface", metavar="INPUT")
+@click.option("--out", required=True, metavar="FILE", help="FILE.obj, .ply or .npz.")
+@click.option("--device", default="auto", show_default=True, help="auto, cpu or cuda.")
+@click.option("--json", "as_json", is_flag=True, help="Print the report as one JSON object.")
+def map_(model: str, surface: str, out: str, device: str, as_json: bool) -> None:
+    """Apply the model in DIR to other points of its surface, or to a mesh of it.
+
+    The fitted points fill the unit square. A mesh written as OBJ is cut along the seams of the
+    map: a face that lies across one keeps its shape and stays on one side.
+    """
+    check_target(out)
+    from parapoint.estimator import load
+
+    facts = write(load(model, device=device), read_surface(surface), out, None)
+    print(json.dumps(facts) if as_json else f"{out}: {facts['mapped_points']} points mapped")

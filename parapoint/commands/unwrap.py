@@ -1,0 +1,42 @@
+"""`parapoint unwrap`: a surface in, the same surface with UVs out."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import click
+
+from parapoint.commands.fitting import estimator_of, fitted, summary
+from parapoint.commands.output import check_target, write
+from parapoint.files.surfaces import read_surface
+from parapoint.surfaces.components import components
+from parapoint.textures.checkerboard import checkerboard
+
+
+@click.command()
+@click.argument("surface", metavar="INPUT")
+@click.option("--out", required=True, metavar="FILE", help="FILE.obj, .ply or .npz.")
+@click.option("--time-budget", type=float, metavar="S", help="Seconds at most.")
+@click.option(
+    "--components",
+    default="together",
+    show_default=True,
+    help="One map of all, or of each or the largest component.",
+)
+@click.option("--seed", type=int, default=0, show_default=True)
+@click.option("--json", "as_json", is_flag=True, help="Print the report as one JSON object.")
+def unwrap(surface: str, out: str, as_json: bool, **settings: Any) -> None:
+    """Compute the map of a mesh or a point cloud and write it, in the unit square.
+
+    A mesh written as OBJ gets a checkerboard and is cut along the seams of the map: a face whose
+    corners lie on both sides of one keeps its true shape, at the side of its one short edge. With
+    --components largest only that one is written.
+    """
+    check_target(out)
+    given = read_surface(surface)
+    model = fitted(surface, given, estimator_of("computed", settings))
+    if model.components == "largest":
+        given = components(given)[0]
+    facts = write(model, given, out, checkerboard())
+    print(json.dumps({**facts, **model.report_}) if as_json else f"{out}: {summary(model)}")

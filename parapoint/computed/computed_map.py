@@ -1,0 +1,184 @@
+"""The computed map: a flat map of a bare cloud, computed without training."""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from parapoint.computed.flattening import FlatMap, flat_map
+from parapoint.computed.interpolation import Anchors, InterpolatedMap
+from parapoint.computed.reconstruction import ReconstructionError
+from parapoint.estimator import Estimator
+from parapoint.fitting import Fitted, Progress, Session
+from parapoint.parameters import check_whole
+from parapoint.surfaces.frame import Frame
+from parapoint.surfaces.sampling import FEWEST_POINTS, training_points
+from parapoint.surfaces.surface import FloatArray, Surface
+
+logger = logging.getLogger("parapoint")
+
+TRIAL_PER_SECOND = 50
+"""Points of a first, small map for each second of the time budget. It takes about a twentieth of
+the budget at the 1,000 points a second of one idle core, and is what there is on a busy machine."""
+PLANNED = 0.55
+"""Share of the time left in which the second map would be done at the speed of the first. On seven
+models three times as many points took 0.8 to 1.6 times as long each."""
+DESCENDING = 0.8
+"""Share of the time budget after which a map is improved no more."""
+COINCIDENT = 1e-6
+"""Points that agree to this, in radii of the surface, count as one."""
+
+
+@dataclass
+class ComputedMap(Estimator):
+    """A nearly conformal, free-boundary UV map of a bare point cloud, computed without training.
+
+    Ours, and not the paper's method: no network takes part. The cloud is triangulated
+    (`parapoint.computed.reconstruction`), cut open along short seams and flattened one to one
+    (`parapoint.computed.flattening`, `.bijection`); the map of any other point is interpolated
+    between those of the fitted points (`parapoint.computed.interpolation`). docs/COMPUTED.md has
+    the experiments behind it.
+
+        >>> import numpy as np
+        >>> from parapoint import ComputedMap
+        >>> points = np.random.default_rng(0).normal(size=(2000, 3))
+        >>> points /= np.linalg.norm(points, axis=1, keepdims=True)
+        >>> model = ComputedMap().fit(points)
+        >>> uv = model.transform(points)                  # (2000, 2)
+        >>> cut = points[model.seams()]                   # the points where the surface is open
+
+    Attributes:
+        points: the most points that the map is computed on.
+        time_budget: seconds that a fit may take; the number of points follows the machine's speed,
+            as busy as it is. None takes as long as it takes.
+        components: "together", one map of the whole surface; "each", one of each component, side by
+            side in the plane; "largest", one of the largest alone, which then holds for all points.
+        seed: of the draw of points.
+    """
+
+    packages: ClassVar[tuple[str, ...]] = ("libigl", "scipy")
+
+    points: int = 20_000
+    time_budget: float | None = None
+    components: str = "together"
+    seed: int = 0
+
+    @property
+    def deterministic(self) -> bool:
+        """Whether the same seed gives the same map: not where time decides the number of points."""
+        return self.time_budget is None
+
+    def check(self) -> None:
+        """See `Estimator`."""
+        super().check()
+        check_whole("points", self.points, FEWEST_POINTS)
+
+    def fit_part(self, surface: Surface, share: float, session: Session) -> Fitted:
+        """See `parapoint.fitting.Strategy`.
+
+        Raises:
+            ReconstructionError: the points show no surface that can be followed and flattened.
+        """
+        begun = time.monotonic()
+        session.tell(Progress("computing a map"))
+        count = max(FEWEST_POINTS, round(self.points * share))
+        budget = None if self.time_budget is None else self.time_budget * share
+        deadline = math.inf if budget is None else begun + DESCENDING * budget
+        if budget is None:
+            drawn = _computed(surface, count, self.seed, deadline)
+        else:
+            few = min(count, max(FEWEST_POINTS, round(TRIAL_PER_SECOND * budget)))
+            drawn = _computed_within(surface, few, count, self.seed, deadline)
+        flat, cloud = drawn.flat, drawn.cloud
+        if missing := len(cloud) - len(flat.anchors):
+            logger.warning(
+                "%d of %d points are not on the surface that was found", missing, len(cloud)
+            )
+        cut_short = time.monotonic() > deadline
+        if cut_short:
+            logger.warning(
+                "the time was up before the map was at its best; it is of %d points", len(cloud)
+            )
+        anchors = Anchors(cloud[flat.anchors], flat.uv, flat.jacobians)
+        held = InterpolatedMap.of(anchors, flat.inverse_jacobians)
+        report: dict[str, object] = {
+            "points": len(drawn.points),
+            "anchors": len(flat.anchors),
+            "found": flat.facts,
+            "cut_short": cut_short,
+            "seconds": round(time.monotonic() - begun, 3),
+        }
+        return Fitted(held, drawn.frame, drawn.points, (), report)
+
+
+class _Drawn(NamedTuple):
+    """Points drawn of a surface, and the map that was computed on them.
+
+    Attributes:
+        points: (n, 3) in the surface's unit.
+        frame: of these.
+        cloud: (m, 3) the points in the frame, none twice.
+        flat: the map of `cloud`.
+    """
+
+    points: FloatArray
+    frame: Frame
+    cloud: FloatArray
+    flat: FlatMap
+
+
+def _computed(surface: Surface, count: int, seed: int, deadline: float) -> _Drawn:
+    """The map of at most `count` points of a surface."""
+    points = training_points(surface, count, seed)
+    frame = Frame.of(points)
+    cloud = frame.inside(points)
+    _, rows = np.unique(np.round(cloud / COINCIDENT), axis=0, return_index=True)
+    cloud = cloud[np.sort(rows)]
+    return _Drawn(points, frame, cloud, flat_map(cloud, deadline))
+
+
+def _computed_within(surface: Surface, few: int, most: int, seed: int, deadline: float) -> _Drawn:
+    """The map of as many points, up to `most`, as the time up to `deadline` allows.
+
+    A map of `few` points comes first. It tells how fast this machine is on this surface, and it
+    stays where the second map fails, or is cut short and worse.
+    """
+    before = time.monotonic()
+    first: _Drawn | None = None
+    try:
+        first = _computed(surface, few, seed, deadline)
+    except ReconstructionError as error:
+        fault = error
+    now = time.monotonic()
+    affordable = round(few * PLANNED * (deadline - now) / max(now - before, 1e-9))
+    count = min(most, affordable)
+    # Where the surface has no more points than the first map took, there is nothing to add.
+    if count > few and (first is None or len(first.points) == few):
+        try:
+            second = _computed(surface, count, seed, deadline)
+        except ReconstructionError as error:
+            logger.warning("no map of %d points could be computed: %s", count, error)
+            fault = error
+        else:
+            is_whole = time.monotonic() < deadline
+            # Of two that are as good as exact the one of more points stays.
+            if (
+                first is None
+                or is_whole
+                or _conformality(second.flat) > _conformality(first.flat) - 1e-6
+            ):
+                return second
+    if first is None:
+        raise fault
+    return first
+
+
+def _conformality(flat: FlatMap) -> float:
+    """Mean ratio of the singular values of the map's Jacobians, 1 where it keeps all angles."""
+    values = np.linalg.svd(flat.jacobians, compute_uv=False)
+    return float((values[:, 1] / np.maximum(values[:, 0], 1e-300)).mean())

@@ -1,0 +1,153 @@
+"""The story of a fit: the surface is split where asked, each part is fitted, one value comes back.
+
+Estimators (`parapoint.estimator`) differ in their strategy alone: `ComputedMap` computes the map of
+a part, `ParaPoint` trains it. Both return a `Fitted`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from parapoint.surfaces.components import components
+from parapoint.surfaces.frame import Frame
+from parapoint.surfaces.parameterization import TracePoint
+from parapoint.surfaces.sampling import rows_left_out
+from parapoint.surfaces.surface import FloatArray, Mesh, Surface
+
+logger = logging.getLogger("parapoint")
+
+COMPONENTS = ("together", "each", "largest")
+"""What the parameter `components` may say: one map of the whole surface, one of each component,
+or one of the largest component alone."""
+
+
+class SurfaceMap(Protocol):
+    """A map between a surface and the plane, both in the frame of the surface."""
+
+    def flatten(self, points: FloatArray) -> FloatArray:
+        """(N, 3) points of the surface → (N, 2) points of the plane."""
+        ...
+
+    def lift(self, uv: FloatArray) -> FloatArray:
+        """(N, 2) points of the plane → (N, 3) points of the surface."""
+        ...
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Everything that `parapoint.saving` keeps of the map as arrays, by name."""
+        ...
+
+    def facts(self) -> dict[str, Any]:
+        """Everything else that it keeps, as JSON."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """What a fit returns.
+
+    Attributes:
+        map: the map, in the frame.
+        frame: where the surface lies in it.
+        points: (n, 3) the points that the map was fitted to, in the surface's unit.
+        trace: states on the way, where there were any.
+        report: settings and what was found, for tables and `model.json`.
+    """
+
+    map: SurfaceMap
+    frame: Frame
+    points: FloatArray
+    trace: tuple[TracePoint, ...]
+    report: dict[str, object]
+
+    def flatten(self, points: FloatArray) -> FloatArray:
+        """(N, 3) points → (N, 2) points of the plane, both in the surface's unit."""
+        return np.asarray(self.map.flatten(self.frame.inside(points)) * self.frame.scale)
+
+    def lift(self, uv: FloatArray) -> FloatArray:
+        """(N, 2) points of the plane → (N, 3) points, both in the surface's unit."""
+        return self.frame.outside(self.map.lift(uv / self.frame.scale))
+
+
+class Progress(NamedTuple):
+    """What the callback of a fit is told.
+
+    Attributes:
+        phase: what is being done, in a word or two: "reconstructing", "training", ...
+        fraction: share of the fit that is done, from 0 to 1; None where nobody can tell.
+        remaining: seconds to the end; None where nobody can tell.
+        iteration: training steps done; 0 where nothing is trained.
+        losses: means of the training terms since they were last told; often empty.
+    """
+
+    phase: str
+    fraction: float | None = None
+    remaining: float | None = None
+    iteration: int = 0
+    losses: dict[str, float] = {}  # noqa: RUF012 (a default of a named tuple, never changed)
+
+
+def _silent(_: Progress) -> None:
+    pass
+
+
+@dataclass(frozen=True)
+class Session:
+    """What accompanies one fit.
+
+    Attributes:
+        tell: is called with each Progress.
+        checkpoint: folder for the state of the training, or None.
+        watched: (N, 3) points whose maps along the way go into the trace, or None.
+    """
+
+    tell: Callable[[Progress], None] = _silent
+    checkpoint: Path | None = None
+    watched: FloatArray | None = field(default=None, compare=False)
+
+    def of_component(self, number: int) -> Session:
+        """The session of one of several components: a checkpoint of its own, no watched points."""
+        folder = None if self.checkpoint is None else self.checkpoint / f"component-{number}"
+        return dataclasses.replace(self, checkpoint=folder, watched=None)
+
+
+Strategy = Callable[[Surface, float, Session], Fitted]
+"""Fits one part of a surface, with its share (0 to 1) of the points and of the time."""
+
+
+def fitted(strategy: Strategy, surface: Surface, parts: str, session: Session) -> Fitted:
+    """The map of a surface, or of its components as COMPONENTS says.
+
+    Raises:
+        InputError: the strategy cannot be fitted to a part.
+    """
+    left_out = rows_left_out(surface)
+    found = [surface] if parts == "together" else components(surface)
+    if len(found) > 1 and parts == "largest":
+        logger.warning("%d components: the largest is fitted", len(found))
+    if parts == "largest" or len(found) == 1:
+        whole = strategy(found[0], 1.0, session)
+    else:
+        logger.warning("%d components: each is fitted", len(found))
+        whole = _each(strategy, found, session)
+    return dataclasses.replace(whole, report=whole.report | left_out)
+
+
+def _each(strategy: Strategy, parts: list[Surface], session: Session) -> Fitted:
+    """The maps of several components, side by side; a part's size decides its share."""
+    from parapoint.side_by_side import side_by_side
+
+    sizes = [len(part.vertices if isinstance(part, Mesh) else part.points) for part in parts]
+    made = []
+    for number, (part, size) in enumerate(zip(parts, sizes, strict=True)):
+        own = session.of_component(number)
+        made.append(strategy(part, size / sum(sizes), own))
+        if own.checkpoint is not None and own.checkpoint.is_dir():
+            own.checkpoint.rmdir()
+    return side_by_side(made)

@@ -1,0 +1,111 @@
+"""The map that trained networks make, as the rest of the library sees it: arrays in, arrays out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from parapoint.errors import InputError
+from parapoint.learned.networks import ACTIVATIONS, Networks, SurfaceNetworks
+from parapoint.learned.presets import Preset
+from parapoint.surfaces.surface import FloatArray
+
+BATCH = {"cpu": 2_048, "cuda": 65_536}
+"""Points that go through the networks at a time: on a CPU their layers stay in its cache."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrainedMap:
+    """The five trained networks as a `SurfaceMap`.
+
+    Attributes:
+        networks: Deform, Cut, Stitch, Wrap and Unwrap.
+        preset: the numbers of the run; the sizes of the networks are among them.
+        threads: processor threads that torch may use, None for as many as it uses anyway.
+    """
+
+    networks: SurfaceNetworks
+    preset: Preset
+    threads: int | None = None
+
+    def flatten(self, points: FloatArray) -> FloatArray:
+        """See `SurfaceMap`: Unwrap(Cut(P))."""
+        return self._mapped(points, 2, self.networks.parameterization)
+
+    def lift(self, uv: FloatArray) -> FloatArray:
+        """See `SurfaceMap`: Stitch(Wrap(Q))."""
+        return self._mapped(uv, 3, self.networks.surface)
+
+    def _mapped(
+        self, values: FloatArray, columns: int, networks: Callable[[Tensor], Tensor]
+    ) -> FloatArray:
+        mapped = np.empty((len(values), columns))
+        device = next(self.networks.parameters()).device
+        batch = BATCH[device.type]
+        with torch.no_grad(), threads(self.threads):
+            for begin in range(0, len(values), batch):
+                rows = slice(begin, begin + batch)
+                x = torch.from_numpy(values[rows]).float().to(device)
+                mapped[rows] = networks(x).cpu().numpy()
+        return mapped
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """See `SurfaceMap`."""
+        return {name: of.cpu().numpy() for name, of in self.networks.state_dict().items()}
+
+    def facts(self) -> dict[str, Any]:
+        """See `SurfaceMap`."""
+        return {"preset": self.preset.facts()}
+
+    @classmethod
+    def restored(cls, arrays: dict[str, np.ndarray], facts: dict[str, Any], device: str) -> Self:
+        """The map that `arrays` and `facts` returned, on a device.
+
+        Raises:
+            InputError: the device or a number of the preset is not as it has to be.
+            RuntimeError: the arrays do not fit the networks of the preset.
+        """
+        preset = Preset.from_facts(facts["preset"])
+        most = max(array.size for array in arrays.values())
+        if preset.largest_layer() > most:  # before memory is taken for networks of a false size
+            raise InputError("the sizes of the networks do not fit the saved arrays")
+        networks = new_networks(preset, torch.Generator())
+        networks.load_state_dict({n: torch.tensor(array) for n, array in arrays.items()})
+        return cls(networks.to(device_of(device)), preset)
+
+
+def new_networks(preset: Preset, generator: torch.Generator) -> Networks:
+    """Networks of a preset with random weights."""
+    activation = ACTIVATIONS[preset.activation]
+    return Networks(preset.hidden, preset.embedding, activation, generator)
+
+
+def device_of(name: str) -> str:
+    """The device of a name: "auto" is CUDA where there is any.
+
+    Raises:
+        InputError: there is no such device.
+    """
+    if name not in ("auto", "cpu", "cuda"):
+        raise InputError(f"device must be auto, cpu or cuda, not {name!r}")
+    available = torch.cuda.is_available()
+    if name == "cuda" and not available:
+        raise InputError("device cuda: none is available; take auto or cpu")
+    return "cuda" if available and name != "cpu" else "cpu"
+
+
+@contextmanager
+def threads(count: int | None) -> Iterator[None]:
+    """Torch on this many threads, and as before afterwards."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(count or before)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)

@@ -1,0 +1,43 @@
+"""Checks of parameters: each raises one clear line where a value is not what it has to be."""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections.abc import Collection
+
+from parapoint.errors import InputError
+
+
+def check_whole(name: str, value: object, least: int) -> None:
+    """Raise InputError unless `value` is a whole number (numpy's count too) of at least `least`."""
+    is_whole = isinstance(value, numbers.Integral) and not isinstance(value, bool)
+    if not is_whole or int(str(value)) < least:
+        raise InputError(f"{name} must be a whole number of at least {least}, not {value!r}")
+
+
+def check_choice(name: str, value: object, choices: Collection[str]) -> None:
+    """Raise InputError unless `value` is one of `choices`."""
+    if value not in choices:
+        raise InputError(f"{name} must be one of {', '.join(choices)}, not {value!r}")
+
+
+def check_number(
+    name: str, value: object, least: float = 0.0, most: float = math.inf, *, above: bool = False
+) -> None:
+    """Raise InputError unless `value` is a finite number in [least, most].
+
+    Args:
+        name: what the message calls the value.
+        value: what is checked.
+        least: lower bound.
+        most: upper bound; none by default.
+        above: whether `least` itself is refused.
+    """
+    is_number = isinstance(value, numbers.Real) and not isinstance(value, bool)
+    number = float(str(value)) if is_number else math.nan
+    fits = math.isfinite(number) and least <= number <= most and not (above and number == least)
+    if not fits:
+        bound = f"above {least:g}" if above else f"of at least {least:g}"
+        upper = "" if math.isinf(most) else f" and at most {most:g}"
+        raise InputError(f"{name} must be a number {bound}{upper}, not {value!r}")

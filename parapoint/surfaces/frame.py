@@ -1,0 +1,54 @@
+"""The frame in which a surface is mapped: centred and scaled, so place and unit do not count."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from parapoint.errors import InputError
+from parapoint.surfaces.surface import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A similarity of space: a point p of the surface is (p − centre) / scale inside the frame.
+
+    Attributes:
+        centre: (3,) the point that becomes the origin.
+        scale: the length that becomes 1, in the surface's unit.
+
+    Raises:
+        InputError: the centre is not three finite numbers, or the scale is not positive and finite.
+    """
+
+    centre: FloatArray
+    scale: float
+
+    def __post_init__(self) -> None:
+        centre = np.asarray(self.centre, dtype=np.float64)
+        if centre.shape != (3,) or not np.isfinite(centre).all():
+            raise InputError("the centre of a frame must be three finite numbers")
+        if not 0 < self.scale < np.inf:
+            raise InputError(f"the scale of a frame must be a positive number, not {self.scale}")
+        object.__setattr__(self, "centre", centre)
+
+    @classmethod
+    def of(cls, points: FloatArray) -> Self:
+        """The frame of (N, 3) points: their bounding box around the origin, largest norm 1."""
+        low, high = points.min(axis=0), points.max(axis=0)
+        centre = low + (high - low) / 2
+        return cls(centre, float(np.linalg.norm(points - centre, axis=1).max()))
+
+    def inside(self, points: FloatArray) -> FloatArray:
+        """(N, 3) points of the surface → the same points in the frame."""
+        return np.asarray((points - self.centre) / self.scale)
+
+    def outside(self, points: FloatArray) -> FloatArray:
+        """(N, 3) points in the frame → the same points in the surface's unit and place."""
+        return np.asarray(points * self.scale + self.centre)
+
+
+IDENTITY = Frame(np.zeros(3), 1.0)
+"""The frame that leaves points as they are."""

@@ -1,0 +1,1 @@
+"""Textures: what is painted on a surface through its map."""
