@@ -13,7 +13,10 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 EPSILON = 1e-12
-"""Added under square roots whose gradient is infinite at 0, where a map is exactly conformal."""
+"""Added under square roots whose gradient is infinite at 0: of distances, in the shape's radius;
+of stretches, in their own size, so that it stays small where a map shrinks all."""
+SMALLEST = 1e-30
+"""Added where all stretches may be 0, too."""
 
 
 class NotFiniteError(ArithmeticError):
@@ -104,17 +107,27 @@ def singular_values(tangents: Tensor) -> tuple[Tensor, Tensor]:
     other form loses half of its digits near a conformal map.
     """
     E, F, G = first_fundamental_form(tangents)
-    area = (torch.linalg.cross(tangents[0], tangents[1]).square().sum(1) + EPSILON**2).sqrt()
-    total = (E + G + 2 * area).sqrt()
-    difference = ((E - G).square() + 4 * F.square() + EPSILON).sqrt() / total
+    area = torch.linalg.cross(tangents[0], tangents[1]).square().sum(1)
+    total = (E + G + 2 * (area + _floor(E + G)).sqrt()).sqrt()
+    difference = _split(E, F, G) / total
     return (total + difference) / 2, (total - difference) / 2
 
 
 def gram_eigenvalues(tangents: Tensor) -> tuple[Tensor, Tensor]:
     """λ1 ≥ λ2 (N,) of JᵀJ: the other reading of "eigenvalues of J"; squares of the first."""
     E, F, G = first_fundamental_form(tangents)
-    difference = ((E - G).square() + 4 * F.square() + EPSILON).sqrt()
+    difference = _split(E, F, G)
     return (E + G + difference) / 2, (E + G - difference) / 2
+
+
+def _split(E: Tensor, F: Tensor, G: Tensor) -> Tensor:
+    """λ1² − λ2² of the singular values."""
+    return ((E - G).square() + 4 * F.square() + _floor(E + G)).sqrt()
+
+
+def _floor(stretch: Tensor) -> Tensor:
+    """What is added under the root of a square of stretches of this size."""
+    return EPSILON * stretch.detach().square() + SMALLEST
 
 
 EIGENVALUES = {"singular": singular_values, "gram": gram_eigenvalues}

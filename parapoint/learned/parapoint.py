@@ -172,7 +172,7 @@ class ParaPoint(Estimator):
 
     def _report(self, trainer: Trainer, trace: tuple[TracePoint, ...]) -> dict[str, object]:
         preset = trainer.preset
-        used = trainer.shape.shape[1]
+        used = len(trainer.shape.points)
         return {
             "preset": self.preset,
             "points": used,

@@ -17,7 +17,7 @@ CHOICES = {
     "branches": ("both", "3d", "2d"),
     "distortion": ("conformal", "isometric"),
     "eigenvalues": ("singular", "gram"),
-    "precision": ("float32", "bfloat16"),
+    "optimizer": ("adamw", "soap"),
 }
 """What each setting in words may say."""
 NUMBERS = (
@@ -30,9 +30,6 @@ NUMBERS = (
     "unfolding_weight",
     "unwrap_spacing",
     "anti_flip_angle",
-    "learning_rate",
-    "final_learning_rate",
-    "weight_decay",
 )
 """Settings that may be any number of at least 0."""
 
@@ -52,7 +49,11 @@ class Preset:
         iterations: steps, warm-up included (the text gives none; the group's later code 10,000).
         subset: points that go through the networks in a step before `all_from`, drawn anew each
             time (open: "a sparser subset"); the Chamfer distance is to all points throughout.
+        patch: points of a step that lie beside one another, each centre's nearest of all points, so
+            that terms which compare neighbours see neighbours; 1 draws each for itself (open).
         all_from: share of the run after which each step takes all points (open: "later").
+        starts: runs from other weights, of which the one with the lowest loss goes on (open).
+        start_share: share of the run that goes to each, where there are several (open).
         warm_up: share of the run that goes to the points' convex hull (open).
         perturbation: standard deviation of the noise on points, in mean distances between
             neighbouring training points (open: "slightly").
@@ -65,10 +66,8 @@ class Preset:
         unwrap_spacing: ε = spacing · L(Q) / √N.
         anti_flip_neighbours: K of the anti-flip term.
         anti_flip_angle: T_angle.
-        learning_rate, final_learning_rate: ends of the cosine (open; from the later code).
-        weight_decay: of AdamW (open; from the later code).
-        precision: "float32", or "bfloat16" for the wide products of training where the processor
-            has units for them (twice as fast; the gradient's direction stays, cosine 0.9995).
+        optimizer: "adamw", as in the group's later code, or "soap" (open).
+        learning_rate: with which the run begins; None takes the optimiser's own (open).
     """
 
     hidden: tuple[int, ...] = (64, 128, 512, 128)
@@ -78,7 +77,10 @@ class Preset:
     points: int = 10_000
     iterations: int = 10_000
     subset: int = 2_048
+    patch: int = 1
     all_from: float = 0.5
+    starts: int = 1
+    start_share: float = 0.05
     warm_up: float = 0.15
     perturbation: float = 0.1
     unwrap_weight: float = 0.01
@@ -93,10 +95,8 @@ class Preset:
     unwrap_spacing: float = 0.1
     anti_flip_neighbours: int = 4
     anti_flip_angle: float = math.pi / 2
-    learning_rate: float = 1e-3
-    final_learning_rate: float = 1e-5
-    weight_decay: float = 1e-8
-    precision: str = "float32"
+    optimizer: str = "adamw"
+    learning_rate: float | None = None
 
     def __post_init__(self) -> None:
         for name, least in (
@@ -105,7 +105,7 @@ class Preset:
             ("iterations", 1),
         ):
             check_whole(name, getattr(self, name), least)
-        for name in ("embedding", "unwrap_neighbours", "anti_flip_neighbours"):
+        for name in ("patch", "starts", "embedding", "unwrap_neighbours", "anti_flip_neighbours"):
             check_whole(name, getattr(self, name), 1)
         for size in self.hidden:
             check_whole("a hidden layer's size", size, 1)
@@ -115,6 +115,9 @@ class Preset:
             check_number(name, getattr(self, name), most=1.0)
         for name in NUMBERS:
             check_number(name, getattr(self, name))
+        if self.learning_rate is not None:
+            check_number("learning_rate", self.learning_rate)
+        check_number("start_share", self.start_share, most=1 / self.starts)
 
     def facts(self) -> dict[str, Any]:
         """All numbers, as JSON has them."""

@@ -195,22 +195,6 @@ def test_weights_come_from_the_generator_alone() -> None:
         assert float(a.detach().abs().max()) <= 1 / np.sqrt(2)
 
 
-def test_bfloat16_is_for_training_alone_and_keeps_the_gradient_s_direction() -> None:
-    points = torch.randn(200, 3, generator=generator())
-    grid = torch.rand(200, 2, generator=generator())
-    exact, reduced = networks(), networks()
-    reduced.train_in(torch.bfloat16)
-    with torch.no_grad():
-        assert torch.equal(reduced.parameterization(points), exact.parameterization(points))
-    gradients = []
-    for net in (exact, reduced):
-        for output in net(points[None], grid):
-            sum(part.square().sum() for part in output).backward(retain_graph=True)
-        gradients.append(torch.cat([p.grad.flatten() for p in net.parameters()]))
-    assert not torch.equal(*gradients)
-    assert torch.nn.functional.cosine_similarity(*gradients, dim=0) > 0.99
-
-
 def test_tangents_of_the_surface_are_unfolded() -> None:
     net = networks("squareplus", hidden=(8,)).double()
     points = torch.randn(5, 3, generator=generator(), dtype=torch.float64)

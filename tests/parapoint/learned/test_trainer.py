@@ -9,10 +9,8 @@ from parapoint.learned import losses, trainer
 from parapoint.learned.networks import Cycle, GridBranch, PointBranch
 from parapoint.learned.presets import PAPER
 from parapoint.learned.trainer import (
-    AdamW,
     DivergedError,
     Trainer,
-    lattice,
     objective_terms,
     oriented_normals,
     tangent_frames,
@@ -32,27 +30,6 @@ def tiny(**changes: object) -> Trainer:
 
 def weights(of: Trainer) -> np.ndarray:
     return torch.cat([p.detach().flatten() for p in of.networks.parameters()]).numpy()
-
-
-def test_adamw_is_that_of_torch() -> None:
-    def copies() -> list[torch.nn.Parameter]:
-        generator = torch.Generator().manual_seed(1)
-        return [torch.nn.Parameter(torch.randn(4, 3, generator=generator)) for _ in range(3)]
-
-    def gradients(parameters: list[torch.nn.Parameter]) -> None:
-        sum((p.square() * (k + 1) + p).sum() for k, p in enumerate(parameters[:2])).backward()
-
-    ours, theirs = copies(), copies()
-    own, other = AdamW(ours, 0.1), torch.optim.AdamW(theirs, lr=1e-2, weight_decay=0.1)
-    for _ in range(20):
-        gradients(ours)
-        own.step(1e-2)
-        gradients(theirs)
-        other.step()
-        other.zero_grad()
-    for mine, its in zip(ours, theirs, strict=True):
-        torch.testing.assert_close(mine, its)
-    assert torch.equal(ours[2], copies()[2])  # without a gradient nothing decays
 
 
 def test_the_run_goes_from_the_hull_to_a_subset_to_all_points(monkeypatch) -> None:
@@ -101,6 +78,52 @@ def test_the_total_is_the_weighted_sum() -> None:
     assert terms["total"] == pytest.approx(expected, rel=1e-5)
 
 
+def several_starts(**changes: object) -> Trainer:
+    return tiny(starts=3, start_share=0.2, warm_up=0.1, all_from=1.0, **changes)
+
+
+def test_each_start_begins_the_schedule_anew_and_the_last_goes_on() -> None:
+    of = several_starts()
+    phases, rates = [], []
+    for step in of.run():
+        phases.append(step.phase)
+        rates.append(of._learning_rate())
+    # Of 40 steps three starts take 8 each; the one that goes on is then at 8 of 24.
+    hull, rest = ["hull"] * 3, ["subset"] * 5
+    assert phases == [*hull, *rest, *hull, *rest, *hull, *rest, *["subset"] * 16]
+    assert rates[:7] == pytest.approx(rates[8:15])
+    assert rates[16:23] == pytest.approx(rates[:7])
+    assert rates[23:] == pytest.approx(sorted(rates[23:], reverse=True))
+    assert rates[-1] == pytest.approx(1e-5)
+
+
+def test_the_start_of_lowest_loss_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    of = several_starts()
+    keep, ends, at_end = Trainer._step, {}, iter([3.0, 1.0, 2.0])
+
+    def step(self: Trainer) -> dict[str, float]:
+        terms = keep(self)
+        if self.iteration in (7, 15, 23):
+            ends[self._start] = weights(self)
+            return {**terms, "total": next(at_end)}
+        return {**terms, "total": 9.0}
+
+    monkeypatch.setattr(Trainer, "_step", step)
+    run = of.run()
+    states = [weights(of) for _ in zip(range(24), run, strict=False)]
+    assert np.array_equal(states[23], ends[1])
+    assert not np.array_equal(ends[0], ends[1])
+    # Each start has weights of its own, not those of the one before.
+    assert np.abs(states[7] - ends[0]).max() > 0.1
+    assert np.abs(states[15] - states[7]).max() > 0.1
+
+
+def test_networks_that_are_given_have_one_start() -> None:
+    of = several_starts()
+    given = Trainer(sphere(), of.preset, seed=0, device="cpu", networks=of.networks)
+    assert [step.phase for step in given.run()] == ["hull"] * 4 + ["subset"] * 36
+
+
 def test_the_learning_rate_follows_a_cosine() -> None:
     of = tiny()
     assert of._learning_rate() == pytest.approx(1e-3)
@@ -133,11 +156,13 @@ def test_the_same_seed_gives_the_same_weights_and_leaves_torch_s_generator_alone
     assert not np.array_equal(weights(other), weights(tiny()))
 
 
-def test_a_resumed_run_ends_as_one_that_was_not_stopped() -> None:
-    whole, first, second = tiny(), tiny(), tiny()
+@pytest.mark.parametrize("optimizer", ["adamw", "soap"])
+@pytest.mark.parametrize("stop", [2, 9, 17, 27])
+def test_a_resumed_run_ends_as_one_that_was_not_stopped(optimizer: str, stop: int) -> None:
+    whole, first, second = (several_starts(optimizer=optimizer, patch=4) for _ in range(3))
     list(whole.run())
     run = first.run()
-    for _ in range(17):
+    for _ in range(stop):
         next(run)
     tensors = {name: t.clone() for name, t in first.tensors().items()}
     second.resume(tensors, first.facts())
@@ -184,14 +209,6 @@ def test_the_run_ends_with_the_best_state_of_its_last_phase(monkeypatch) -> None
     list(of.run())
     assert states == list(range(8))
     assert np.unique(weights(of)).tolist() == [5.0]
-
-
-def test_a_lattice_has_one_point_in_each_cell() -> None:
-    points = lattice(4, torch.Generator().manual_seed(0)).numpy()
-    cells = np.floor((points + 1) * 2).astype(int)
-    assert len(np.unique(cells, axis=0)) == 16
-    assert cells.min() == 0
-    assert cells.max() == 3
 
 
 def test_a_planar_cloud_warms_up_on_itself() -> None:
