@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from benchmarks.cases.builtin import sphere, torus
+from parapoint.computed import flattening
 from parapoint.computed.bijection import signed_areas
 from parapoint.computed.flattening import (
     FlatMap,
@@ -169,6 +170,17 @@ def test_of_two_pins_that_is_cut_whose_cut_gains_more_for_each_edge() -> None:
     copied = cut.vertices[len(mesh.vertices) :]
     assert len(copied) == 16
     assert (copied[:, 0] <= 4).all()
+
+
+def test_a_tip_is_far_from_the_boundary_and_in_its_scale_from_the_mean(monkeypatch) -> None:
+    # The log scale falls by the row of a pin: the one near the rim, of 22 rows, is the more extreme
+    # of the two, but its tip is 24 edges from the boundary, that of the other, of 20 rows, 30.
+    # 20 · 30 is more than 22 · 24, so the one tip that is tried is in the middle.
+    monkeypatch.setattr(flattening, "TIPS", 1)
+    mesh = plate_with_pins(21, [(220, 20), (213, 22)])
+    copied = _scale_cuts(mesh, 30).vertices[len(mesh.vertices) :]
+    assert len(copied) == 30
+    assert np.abs(copied[copied[:, 2] > 0, :2] - 10).max() <= 1
 
 
 def edges_across(mesh: Mesh, path: list[int]) -> np.ndarray:
