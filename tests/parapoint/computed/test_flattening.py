@@ -234,6 +234,20 @@ def test_cuts_are_at_most_2_2_percent_of_the_faces_of_an_open_surface() -> None:
     assert 16 <= len(_seamed(mesh).vertices) - len(mesh.vertices) <= 29
 
 
+def test_cuts_are_at_most_3_7_percent_of_the_faces_of_a_closed_surface() -> None:
+    # The same plate is closed by 80 triangles to a point below: of 1,408 faces, so 52 edges are cut
+    # at most, those that open it to a disk among them. Cuts to all pins would take 74.
+    plate = plate_with_pins(21, [(220, 16), (213, 14), (227, 14)])
+    (rim,) = plate.boundary_loops
+    below = len(plate.vertices)
+    fan = np.stack([np.roll(rim, -1), rim, np.full(len(rim), below)], axis=1)
+    points = np.concatenate([plate.vertices, [[10.0, 10, -5]]])
+    mesh = Mesh(points, np.concatenate([plate.faces, fan]))
+    assert mesh.topology == "sphere"
+    assert len(mesh.faces) == 1408
+    assert 32 <= len(_seamed(mesh).vertices) - len(mesh.vertices) <= 52
+
+
 def test_a_vertex_s_derivative_is_the_mean_of_its_faces_by_area() -> None:
     # To the right of x = 0, area 1/2, the map is the identity; to the left, area 3/2, it doubles x.
     points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [-3, 0, 0]])
