@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from parapoint.errors import InputError
 from parapoint.files.mesh_formats import COLOUR_COLUMNS
-from parapoint.files.surfaces import complete_file
+from parapoint.files.targets import complete_file
 from parapoint.surfaces.surface import FloatArray, PointCloud, read_only
 
 ROWS_WRITTEN = 65_536

@@ -7,13 +7,11 @@ see `parapoint.files.mesh_formats`). Every fault of a file is one InputError tha
 from __future__ import annotations
 
 import logging
-import os
 import struct
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +19,7 @@ import numpy.typing as npt
 from parapoint.errors import InputError
 from parapoint.files import mesh_formats, point_formats
 from parapoint.files.mesh_formats import NO_UV, Content
+from parapoint.files.targets import beside, complete_file, sealed_png, sealed_text
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import (
     BoolArray,
@@ -266,12 +265,12 @@ def write_obj(
         )
     material = ""
     if texture is not None:
-        image, library = path.with_suffix(".png"), path.with_suffix(".mtl")
-        pixels = png(texture)
+        image, library = beside(path, ".png"), beside(path, ".mtl")
+        pixels = sealed_png(png(texture))
         with complete_file(image) as file:
             file.write(pixels)
         with complete_file(library) as file:
-            file.write(f"newmtl map\nKd 1 1 1\nmap_Kd {image.name}\n".encode())
+            file.write(sealed_text(f"newmtl map\nKd 1 1 1\nmap_Kd {image.name}\n"))
         material = f"mtllib {library.name}\nusemtl map\n"
     corners = np.stack([mesh.faces, parameterization.corners], axis=2).reshape(-1, 6) + 1
     lines = [
@@ -282,18 +281,6 @@ def write_obj(
     ]
     with complete_file(path) as file:
         file.write("".join(lines).encode())
-
-
-@contextmanager
-def complete_file(path: Path) -> Iterator[IO[bytes]]:
-    """A file to write, which takes its name only at the end: nobody ever sees half of it."""
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with unfinished.open("wb") as file:
-            yield file
-        unfinished.replace(path)
-    finally:
-        unfinished.unlink(missing_ok=True)
 
 
 def png(pixels: npt.NDArray[np.uint8]) -> bytes:

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from parapoint import InputError, Mesh, Parameterization, PointCloud
+from parapoint.files import point_writers
 from parapoint.files.point_writers import write_points
 from parapoint.files.surfaces import (
     FORMATS,
