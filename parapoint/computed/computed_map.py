@@ -105,7 +105,7 @@ class ComputedMap(Estimator):
                 "the time was up before the map was at its best; it is of %d points", len(cloud)
             )
         anchors = Anchors(cloud[flat.anchors], flat.uv, flat.jacobians)
-        held = InterpolatedMap.of(anchors, flat.inverse_jacobians)
+        held = InterpolatedMap.of(anchors, flat.inverse_jacobians, flat.charted)
         report: dict[str, object] = {
             "points": len(drawn.points),
             "anchors": len(flat.anchors),
