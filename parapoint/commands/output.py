@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from parapoint.errors import InputError
 from parapoint.estimator import Estimator
-from parapoint.files.surfaces import write_obj, write_points
 from parapoint.files.targets import checked_target
+from parapoint.files.writing import write_obj, write_points
 from parapoint.surfaces.sampling import mean_spacing
 from parapoint.surfaces.spanning import Transform, opened, spanning_edges
 from parapoint.surfaces.surface import Mesh, PointCloud, Surface

@@ -14,14 +14,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from parapoint import InputError, Mesh, Parameterization, PointCloud
-from parapoint.files import surfaces as files
-from parapoint.files.surfaces import (
-    FORMATS,
-    read_parameterized,
-    read_surface,
-    write_obj,
-    write_points,
-)
+from parapoint.files import writing as files
+from parapoint.files.reading import FORMATS, read_parameterized, read_surface
+from parapoint.files.writing import write_obj, write_points
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
 TRIANGLES = [[0, 1, 2], [0, 2, 3]]

@@ -1,82 +1,18 @@
-"""Readers of point-cloud files: XYZ, PTS, PCD and LAS; bytes in, `Content` without faces out.
+"""PCD of the Point Cloud Library: bytes in, `Content` without faces out.
 
-The PCD reader is our own: the packages that read the format bring a validation framework and a
-compiled LZF module for what is a header and a table. See `parapoint.files.mesh_formats` for what is
-raised on bytes that are no such file.
+Ours: the packages that read the format bring a validation framework and a compiled LZF module for
+what is a header and a table.
 """
 
 from __future__ import annotations
 
-import io
 import struct
 
 import numpy as np
 
 from parapoint.errors import InputError
-from parapoint.files.mesh_formats import Content, points_content
-from parapoint.surfaces.surface import FloatArray
-
-
-def table(lines: list[bytes], columns: tuple[int, ...]) -> FloatArray:
-    """(n, len(columns)) numbers in these columns of text lines; empty for no lines."""
-    if not lines:
-        return np.zeros((0, len(columns)))
-    text = (line.decode("latin-1") for line in lines)  # no second copy of millions of lines
-    return np.loadtxt(text, comments="#", usecols=columns, ndmin=2, dtype=np.float64)
-
-
-def text_lines(data: bytes) -> list[bytes]:
-    """Lines that hold more than blanks and comments, commas turned into blanks."""
-    return [
-        line
-        for line in data.replace(b",", b" ").splitlines()
-        if line.strip() and not line.lstrip().startswith((b"#", b"//"))
-    ]
-
-
-def xyz(data: bytes) -> Content:
-    """Text with x y z in each line; three further columns are normals if all have length 1."""
-    lines = text_lines(data)
-    if lines and len(lines[0].split()) == 1:
-        lines = lines[1:]  # a count on its own, as scanners write it
-    if not lines:
-        raise InputError("has no point")
-    if len(lines[0].split()) < 6:
-        return points_content(table(lines, (0, 1, 2)))
-    values = table(lines, (0, 1, 2, 3, 4, 5))
-    normals = values[:, 3:]
-    finite = np.isfinite(values).all(axis=1)
-    length = np.linalg.norm(np.clip(normals[finite], -2, 2), axis=1)  # clipped: no overflow
-    unit = bool(len(length)) and bool((np.abs(length - 1) < 1e-3).all())
-    return points_content(values[:, :3], normals if unit else None)
-
-
-def pts(data: bytes) -> Content:
-    """PTS: lines "p x y z" (Hoppe), or a count and then x y z and what a scanner adds."""
-    lines = text_lines(data)
-    marked = [line for line in lines if line.startswith(b"p ")]
-    return points_content(table(marked, (1, 2, 3))) if marked else xyz(data)
-
-
-def las(data: bytes) -> Content:
-    """LAS, and LAZ where laspy has a decoder: scaled coordinates of all points."""
-    import laspy
-
-    if data[:4] != b"LASF":
-        raise InputError("has no LAS header")
-    if data[24:25] != b"\x01":  # laspy goes by the minor version alone
-        raise InputError(f"is of LAS version {data[24]}.{data[25]}; 1.0 to 1.4 are read")
-    # laspy makes room for whatever the header announces, be it four thousand million points.
-    start, records, kind, width, points = struct.unpack_from("<IIBHI", data, 96)
-    extended = 0
-    if data[24:26] >= b"\x01\x04":
-        extended, points = struct.unpack_from("<IQ", data, 243)
-    compressed = kind >= 128
-    if not compressed and start + width * points > len(data):
-        raise InputError(f"ends early: {points} points are announced")
-    if 54 * records + 60 * extended > len(data):
-        raise InputError(f"ends early: {records + extended} variable records are announced")
-    return points_content(np.asarray(laspy.read(io.BytesIO(data)).xyz, dtype=np.float64))
+from parapoint.files.content import Content, points_content
+from parapoint.files.xyz import table, text_lines
 
 
 def pcd(data: bytes) -> Content:
