@@ -145,6 +145,35 @@ def test_the_schedule_follows_a_time_budget_that_ends_first(monkeypatch) -> None
     assert [step.phase for step in steps] == ["hull"] * 3 + ["subset"] * 5 + ["all"] * 2
 
 
+@pytest.mark.parametrize(
+    ("budget", "most", "expected"),
+    [
+        (5.0, 2_048, 256),  # 1 s a step: too few steps as it is
+        (20_000.0, 2_048, 1_024),  # four times as many steps as are enough
+        (1e6, 2_048, 2_048),  # the preset's points at most
+        (5.0, 200, 200),
+    ],
+)
+def test_a_time_budget_chooses_the_points_of_a_step(
+    monkeypatch: pytest.MonkeyPatch, budget: float, most: int, expected: int
+) -> None:
+    clock = iter(range(1000))
+    monkeypatch.setattr(trainer.time, "perf_counter", lambda: float(next(clock)))  # 1 s a step
+    monkeypatch.setattr(Trainer, "_step", lambda _: {"total": 1.0})
+    preset = replace(TINY, subset=most, iterations=10**6)
+    of = Trainer(sphere(), preset, seed=0, device="cpu", time_budget=budget)
+    seen = [of.subset for _ in zip(range(9), of.run(), strict=False)]
+    assert of.subset == pytest.approx(expected, abs=2)
+    assert seen[:3] == [min(256, most)] * 3
+
+
+def test_a_run_without_a_time_budget_takes_the_preset_s_points() -> None:
+    of = tiny(subset=120)
+    next(of.run())
+    assert of.subset == 120
+    assert 0 < of.processor_seconds < 10
+
+
 def test_the_same_seed_gives_the_same_weights_and_leaves_torch_s_generator_alone() -> None:
     before = torch.get_rng_state()
     first, second = tiny(), tiny()
