@@ -182,6 +182,7 @@ class ParaPoint(Estimator):
             "points_of_a_step": min(trainer.subset, used),
             "iterations": trainer.iteration,
             "optimizer": preset.optimizer,
+            "starts": trainer.starts,
             "warm_up": preset.warm_up,
             "weights": trainer.weights,
             "distortion": preset.distortion,

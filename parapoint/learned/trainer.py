@@ -31,6 +31,8 @@ SHORT = 256
 """Points of a step where a time budget allows no more."""
 TIMED = range(3, 8)
 """Steps of so many points that are timed; those before set up what later ones use."""
+LATER = 4
+"""Times as many points take the later steps under a time budget, which all would exceed."""
 ENOUGH_STEPS = 5_000
 """A time budget that allows more steps of SHORT points than these gives larger ones in place."""
 SMALLER_STEP = 0.3
@@ -332,7 +334,9 @@ class Trainer:
     def _batch(self) -> tuple[Tensor, Tensor]:
         """Perturbed points of the phase (see `prepared`) and a perturbed lattice (about n, 2)."""
         cloud = self._cloud()
-        size = len(cloud.points) if self._phase() == "all" else self.subset
+        size = self.subset
+        if self._phase() == "all":
+            size = len(cloud.points) if self.time_budget is None else LATER * self.subset
         rows = cloud.drawn(size, self.generator)
         size = rows.shape[1]
         noise = torch.zeros(rows.shape)

@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 import torch
 
+from parapoint.errors import InputError
 from parapoint.learned import losses, trainer
 from parapoint.learned.networks import Cycle, GridBranch, PointBranch
-from parapoint.learned.presets import PAPER
+from parapoint.learned.presets import PAPER, Preset
 from parapoint.learned.trainer import (
     DivergedError,
     Trainer,
@@ -16,7 +17,7 @@ from parapoint.learned.trainer import (
     tangent_frames,
 )
 
-TINY = replace(PAPER, hidden=(8, 8), embedding=4, subset=100, iterations=40, points=200)
+TINY = Preset(hidden=(8, 8), embedding=4, subset=100, iterations=40, points=200)
 
 
 def sphere(count: int = 200) -> np.ndarray:
@@ -118,6 +119,14 @@ def test_the_start_of_lowest_loss_goes_on(monkeypatch: pytest.MonkeyPatch) -> No
     assert np.abs(states[15] - states[7]).max() > 0.1
 
 
+def test_starts_that_would_see_nothing_but_the_hull_are_refused() -> None:
+    replace(TINY, starts=3, start_share=0.1, warm_up=0.12)
+    with pytest.raises(InputError, match=r"warm_up 0.13 is too much for starts of 0.1"):
+        replace(TINY, starts=3, start_share=0.1, warm_up=0.13)
+    with pytest.raises(InputError, match=r"start_share must be a number .* at most 0.5"):
+        replace(TINY, starts=2, start_share=0.6)
+
+
 def test_networks_that_are_given_have_one_start() -> None:
     of = several_starts()
     given = Trainer(sphere(), of.preset, seed=0, device="cpu", networks=of.networks)
@@ -165,6 +174,16 @@ def test_a_time_budget_chooses_the_points_of_a_step(
     seen = [of.subset for _ in zip(range(9), of.run(), strict=False)]
     assert of.subset == pytest.approx(expected, abs=2)
     assert seen[:3] == [min(256, most)] * 3
+
+
+def test_later_steps_take_all_points_or_four_times_as_many_under_a_time_budget() -> None:
+    def last_sizes(**changes: object) -> tuple[int, int]:
+        of = Trainer(sphere(2_000), replace(TINY, all_from=0.0, warm_up=0.0), seed=0, **changes)
+        points, grid = of._batch()
+        return points.shape[1], len(grid)
+
+    assert last_sizes(device="cpu") == (2_000, 45**2)
+    assert last_sizes(device="cpu", time_budget=10.0) == (400, 400)
 
 
 def test_a_run_without_a_time_budget_takes_the_preset_s_points() -> None:
