@@ -17,7 +17,7 @@ from torch import Tensor
 
 from parapoint.learned import losses
 from parapoint.learned.batches import Cloud, lattice
-from parapoint.learned.networks import ACTIVATIONS, Cycle, Networks, SurfaceNetworks
+from parapoint.learned.networks import ACTIVATIONS, Cycle, Networks, SubNetworks, SurfaceNetworks
 from parapoint.learned.optimizers import OPTIMIZERS
 from parapoint.learned.presets import Preset
 from parapoint.surfaces.sampling import hull_sample, mean_spacing
@@ -31,8 +31,9 @@ SHORT = 256
 """Points of a step where a time budget allows no more."""
 TIMED = range(3, 8)
 """Steps of so many points that are timed; those before set up what later ones use."""
-LATER = 4
-"""Times as many points take the later steps under a time budget, which all would exceed."""
+DENSER = 4
+"""Under a time budget, which steps of all points would exceed, later ones hold a lattice of so many
+times the points of a step against the cloud. A coarse one draws both sides of a finger inwards."""
 ENOUGH_STEPS = 5_000
 """A time budget that allows more steps of SHORT points than these gives larger ones in place."""
 SMALLER_STEP = 0.3
@@ -173,7 +174,7 @@ class Trainer:
             points if self.preset.branches != "2d" else None,
             grid if self.preset.branches != "3d" else None,
         )
-        return objective_terms(self.preset, cycle, given)
+        return objective_terms(self.preset, cycle, given, self._dense_surface())
 
     @property
     def progress(self) -> float:
@@ -334,9 +335,8 @@ class Trainer:
     def _batch(self) -> tuple[Tensor, Tensor]:
         """Perturbed points of the phase (see `prepared`) and a perturbed lattice (about n, 2)."""
         cloud = self._cloud()
-        size = self.subset
-        if self._phase() == "all":
-            size = len(cloud.points) if self.time_budget is None else LATER * self.subset
+        takes_all = self._phase() == "all" and self.time_budget is None
+        size = len(cloud.points) if takes_all else self.subset
         rows = cloud.drawn(size, self.generator)
         size = rows.shape[1]
         noise = torch.zeros(rows.shape)
@@ -344,12 +344,24 @@ class Trainer:
         grid = lattice(round(math.sqrt(size)), self.generator)
         return rows + noise.to(self.device), grid.to(self.device)
 
+    def _dense_surface(self) -> Tensor | None:
+        """(DENSER · M, 3) P̂ of a lattice for the Chamfer distance alone, where one is due."""
+        is_due = self._phase() == "all" and self.time_budget is not None
+        if not is_due or self.preset.branches == "3d":
+            return None
+        networks = self.networks
+        assert isinstance(networks, SubNetworks)
+        grid = lattice(round(math.sqrt(DENSER * self.subset)), self.generator).to(self.device)
+        return networks.surface(networks.deform(grid[None])[0])
+
     def _cloud(self) -> Cloud:
         """What the phase is fitted to."""
         return self.hull if self._phase() == "hull" else self.shape
 
 
-def objective_terms(preset: Preset, cycle: Cycle, points: Tensor) -> dict[str, Tensor]:
+def objective_terms(
+    preset: Preset, cycle: Cycle, points: Tensor, made: Tensor | None = None
+) -> dict[str, Tensor]:
     """The unweighted terms of the objective; those of a branch that is left out are missing.
 
     Args:
@@ -358,6 +370,7 @@ def objective_terms(preset: Preset, cycle: Cycle, points: Tensor) -> dict[str, T
         points: (N, 3) all given points. P̂ is held against these also where a sparse subset goes
             through the networks: against the subset alone the Chamfer distance is mostly sampling
             noise, in which the terms of weight 0.01 drown.
+        made: (M, 3) what is held against them, the grid branch's own P̂ by default.
     """
     distortion = losses.DISTORTIONS[preset.distortion]
     eigenvalues = losses.EIGENVALUES[preset.eigenvalues]
@@ -374,7 +387,7 @@ def objective_terms(preset: Preset, cycle: Cycle, points: Tensor) -> dict[str, T
             terms["unfolding"] = losses.unfolding_loss(there.unfolding)
     if cycle.grid is not None:
         back = cycle.grid
-        terms["wrap"] = losses.wrap_loss(back.points, points)
+        terms["wrap"] = losses.wrap_loss(back.points if made is None else made, points)
         cycle_terms += [(back.uv, back.uv_cycle), (back.cut, back.cut_cycle)]
         tangents_at.append((back.points, back.tangents))
     K, T = preset.anti_flip_neighbours, preset.anti_flip_angle

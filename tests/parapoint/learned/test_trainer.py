@@ -176,14 +176,31 @@ def test_a_time_budget_chooses_the_points_of_a_step(
     assert seen[:3] == [min(256, most)] * 3
 
 
-def test_later_steps_take_all_points_or_four_times_as_many_under_a_time_budget() -> None:
-    def last_sizes(**changes: object) -> tuple[int, int]:
-        of = Trainer(sphere(2_000), replace(TINY, all_from=0.0, warm_up=0.0), seed=0, **changes)
+def test_later_steps_take_all_points_or_a_denser_lattice_under_a_time_budget(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Against the cloud alone: the other terms keep the points of a step."""
+    held = []
+    wrap_loss = losses.wrap_loss
+
+    def watched(made: torch.Tensor, given: torch.Tensor) -> torch.Tensor:
+        held.append((len(made), len(given)))
+        return wrap_loss(made, given)
+
+    monkeypatch.setattr(losses, "wrap_loss", watched)
+
+    def sizes(all_from: float, budget: float | None) -> tuple[int, int]:
+        preset = replace(TINY, all_from=all_from, warm_up=0.0)
+        of = Trainer(sphere(2_000), preset, seed=0, device="cpu", time_budget=budget)
         points, grid = of._batch()
+        terms = of.terms(points, grid, of.shape.points)
+        assert all(value.isfinite() for value in terms.values())
         return points.shape[1], len(grid)
 
-    assert last_sizes(device="cpu") == (2_000, 45**2)
-    assert last_sizes(device="cpu", time_budget=10.0) == (400, 400)
+    assert sizes(0.0, None) == (2_000, 45**2)
+    assert sizes(0.0, 10.0) == (100, 100)
+    assert sizes(1.0, 10.0) == (100, 100)
+    assert held == [(45**2, 2_000), (400, 2_000), (100, 2_000)]
 
 
 def test_a_run_without_a_time_budget_takes_the_preset_s_points() -> None:
