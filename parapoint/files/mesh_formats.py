@@ -15,11 +15,12 @@ from __future__ import annotations
 import base64
 import io
 import json
+import math
 import re
 import struct
 import warnings
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
@@ -47,6 +48,7 @@ class Content:
         normals: (V, 3) vertex normals, or None.
         uv: (T, 2) texture coordinates, or None.
         uv_corners: like `corners`, rows of `uv`; NO_UV where a corner has none.
+        attributes: whatever else is known at each vertex, (V,) or (V, k) by name; see `PointCloud`.
     """
 
     vertices: FloatArray
@@ -55,12 +57,56 @@ class Content:
     normals: FloatArray | None = None
     uv: FloatArray | None = None
     uv_corners: IntArray | None = None
+    attributes: dict[str, npt.NDArray[Any]] = field(default_factory=dict)
 
 
-def points_content(points: FloatArray, normals: FloatArray | None = None) -> Content:
+def points_content(
+    points: FloatArray,
+    normals: FloatArray | None = None,
+    attributes: dict[str, npt.NDArray[Any]] | None = None,
+) -> Content:
     """The content of a file without faces."""
     none = np.zeros(0, dtype=np.int64)
-    return Content(points, none, none, normals)
+    return Content(points, none, none, normals, attributes=attributes or {})
+
+
+def named_attributes(columns: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
+    """Attributes of columns (P,) by name: red, green, blue (and alpha) are one, "colours".
+
+    Coordinates and normals are left out. Scanners' names of the intensity become "intensity".
+    """
+    left = {name: of for name, of in columns.items() if name not in GEOMETRY}
+    attributes = {}
+    for names in COLOUR_COLUMNS:
+        if all(name in left for name in names):
+            chosen = [left.pop(name) for name in names]
+            colours = colours_of(np.stack(chosen, axis=1))
+            if colours is not None:
+                attributes["colours"] = colours
+            break
+    for name, values in left.items():
+        attributes["intensity" if name.lower() in INTENSITIES else name] = values
+    return attributes
+
+
+def colours_of(values: npt.NDArray[Any]) -> npt.NDArray[Any] | None:
+    """(P, 3 or 4) numbers of any type as colours (see `PointCloud`); None where they are none.
+
+    Numbers of 16 bits none of which is over 255 are of 8 bits; so are whole floats over 1.
+    """
+    least, most = (float(of(values, initial=0)) for of in (np.min, np.max))
+    if not (least >= 0 and math.isfinite(most)):  # not so either where one is NaN
+        return None
+    if values.dtype.kind == "f":
+        if most <= 1:
+            return values
+        if most > 65535 or (np.floor(values) != values).any():
+            return None
+    elif most > 65535:
+        return None
+    if values.dtype == np.uint8:
+        return values
+    return values.astype(np.uint8 if most <= 255 else np.uint16)
 
 
 def floats(words: Iterable[Any], columns: int) -> FloatArray:
@@ -275,6 +321,17 @@ def _binary_off_faces(
 
 # PLY ------------------------------------------------------------------------------------------
 
+GEOMETRY = {"x", "y", "z", "nx", "ny", "nz"}
+COLOUR_COLUMNS = (
+    ("red", "green", "blue", "alpha"),
+    ("red", "green", "blue"),
+    ("diffuse_red", "diffuse_green", "diffuse_blue"),
+    ("r", "g", "b"),
+)
+"""Names under which the parts of a colour stand."""
+INTENSITIES = {"intensity", "scalar_intensity", "reflectance", "scalar_reflectance"}
+"""Names under which the strength of a scanner's echo stands, in lower case."""
+
 PLY_TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
     **dict.fromkeys(("uchar", "uint8"), "u1"),
@@ -338,7 +395,7 @@ def ply(data: bytes) -> Content:
     raw = data[match.end() :]
     body = _Body(raw, None if encoding else floats(raw.split(), 1).reshape(-1))
     at = 0
-    columns: dict[str, FloatArray] = {}
+    columns: dict[str, npt.NDArray[Any]] = {}
     sizes = corners = np.zeros(0, dtype=np.int64)
     for name, count, properties in elements:
         if name == "vertex":
@@ -352,11 +409,16 @@ def ply(data: bytes) -> Content:
                 sizes, corners = np.full(len(triangles), 3), triangles.reshape(-1)
     if not all(axis in columns for axis in "xyz"):
         raise InputError("has no vertex element with x, y and z")
-    vertices = np.stack([columns[axis] for axis in "xyz"], axis=1)
+    vertices = _stacked(columns, "x", "y", "z")
     normals = None
     if all(axis in columns for axis in ("nx", "ny", "nz")):
-        normals = np.stack([columns[axis] for axis in ("nx", "ny", "nz")], axis=1)
-    return Content(vertices, sizes, corners, normals)
+        normals = _stacked(columns, "nx", "ny", "nz")
+    return Content(vertices, sizes, corners, normals, attributes=named_attributes(columns))
+
+
+def _stacked(columns: dict[str, npt.NDArray[Any]], *names: str) -> FloatArray:
+    """(n, 3) of three columns."""
+    return np.stack([columns[name] for name in names], axis=1, dtype=np.float64, casting="unsafe")
 
 
 def _ply_header(lines: list[str]) -> tuple[str, list[tuple[str, int, list[_Property]]]]:
@@ -392,22 +454,27 @@ def _ply_header(lines: list[str]) -> tuple[str, list[tuple[str, int, list[_Prope
 
 def _ply_table(
     body: _Body, at: int, count: int, properties: list[_Property]
-) -> tuple[dict[str, FloatArray], int]:
+) -> tuple[dict[str, npt.NDArray[Any]], int]:
     """Columns of an element without lists, by property name, and the unit behind it."""
     if any(item.count_type is not None for item in properties):
         raise InputError("has lists among its vertex properties, which is not read")
-    widths = [body.width(item.type) for item in properties]
-    if not widths:
+    if not properties:
         return {}, at
-    end = at + count * sum(widths)
+    width = sum(body.width(item.type) for item in properties)
+    end = at + count * width
     if end > body.size:
         raise InputError(f"ends early: {count} vertices are announced")
-    rows = at + sum(widths) * np.arange(count)
-    offsets = np.cumsum([0, *widths])
+    if body.numbers is not None:
+        rows = body.numbers[at:end].reshape(count, width)
+        return {
+            item.name: rows[:, k].astype(item.type if item.name not in GEOMETRY else np.float64)
+            for k, item in enumerate(properties)
+        }, end
+    kind = np.dtype([(f"{k}", item.type) for k, item in enumerate(properties)])
+    table = np.frombuffer(body.raw, kind, count, at)
     return {
-        item.name: body.values(rows + offset, item.type)
-        for item, offset in zip(properties, offsets.tolist(), strict=False)
-        if item.name in {"x", "y", "z", "nx", "ny", "nz"}
+        item.name: table[f"{k}"].astype(item.type.newbyteorder("="))
+        for k, item in enumerate(properties)
     }, end
 
 

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import io
 import struct
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from parapoint.errors import InputError
-from parapoint.files.mesh_formats import Content, points_content
+from parapoint.files.mesh_formats import Content, colours_of, named_attributes, points_content
 from parapoint.surfaces.surface import FloatArray
 
 
@@ -35,20 +37,48 @@ def text_lines(data: bytes) -> list[bytes]:
 
 
 def xyz(data: bytes) -> Content:
-    """Text with x y z in each line; three further columns are normals if all have length 1."""
+    """Text with x y z in each line, and whatever columns a scanner adds; see `_further_columns`."""
     lines = text_lines(data)
     if lines and len(lines[0].split()) == 1:
         lines = lines[1:]  # a count on its own, as scanners write it
     if not lines:
         raise InputError("has no point")
-    if len(lines[0].split()) < 6:
-        return points_content(table(lines, (0, 1, 2)))
-    values = table(lines, (0, 1, 2, 3, 4, 5))
-    normals = values[:, 3:]
+    try:
+        values = table(lines, tuple(range(len(lines[0].split()))))
+    except ValueError:  # words, or not in all lines: the coordinates alone
+        values = table(lines, (0, 1, 2))
+    if values.shape[1] < 3:
+        raise InputError("has fewer than three numbers in a line")
+    return points_content(values[:, :3], *_further_columns(values))
+
+
+def _further_columns(
+    values: FloatArray,
+) -> tuple[FloatArray | None, dict[str, npt.NDArray[Any]]]:
+    """Normals, or None, and attributes in the columns behind x y z of (P, 3 + k) numbers.
+
+    Three columns together are normals where all have length 1, and colours where all are whole
+    numbers from 0 to 255 or fractions from 0 to 1. Single columns come before them, as in PTS: the
+    first is the intensity.
+    """
     finite = np.isfinite(values).all(axis=1)
-    length = np.linalg.norm(np.clip(normals[finite], -2, 2), axis=1)  # clipped: no overflow
-    unit = bool(len(length)) and bool((np.abs(length - 1) < 1e-3).all())
-    return points_content(values[:, :3], normals if unit else None)
+    normals: FloatArray | None = None
+    attributes: dict[str, npt.NDArray[Any]] = {}
+    columns = values.shape[1]
+    single = (columns - 3) % 3
+    for at in range(3, 3 + single):
+        attributes["intensity" if at == 3 else f"column{at + 1}"] = values[:, at]
+    for at in range(3 + single, columns, 3):
+        three = values[:, at : at + 3]
+        length = np.linalg.norm(np.clip(three[finite], -2, 2), axis=1)  # clipped: no overflow
+        colours = colours_of(three)
+        if normals is None and len(length) and (np.abs(length - 1) < 1e-3).all():
+            normals = three
+        elif "colours" not in attributes and colours is not None and colours.dtype != np.uint16:
+            attributes["colours"] = colours
+        else:
+            attributes |= {f"column{at + k + 1}": three[:, k] for k in range(3)}
+    return normals, attributes
 
 
 def pts(data: bytes) -> Content:
@@ -76,29 +106,38 @@ def las(data: bytes) -> Content:
         raise InputError(f"ends early: {points} points are announced")
     if 54 * records + 60 * extended > len(data):
         raise InputError(f"ends early: {records + extended} variable records are announced")
-    return points_content(np.asarray(laspy.read(io.BytesIO(data)).xyz, dtype=np.float64))
+    read = laspy.read(io.BytesIO(data))
+    names = [name for name in read.point_format.dimension_names if name not in "XYZ"]
+    columns = {name: np.asarray(read[name]) for name in names}
+    if all(name in columns and not columns[name].any() for name in ("red", "green", "blue")):
+        for name in ("red", "green", "blue"):  # room for colours that were never taken
+            del columns[name]
+    points = np.asarray(read.xyz, dtype=np.float64)
+    return points_content(points, attributes=named_attributes(columns))
 
 
 def pcd(data: bytes) -> Content:
     """PCD of the Point Cloud Library: ascii, binary and binary_compressed."""
     fields, kinds, counts, count, encoding, body = _pcd_header(data)
-    wanted = ["x", "y", "z"]
-    if not set(wanted) <= set(fields):
+    if not {"x", "y", "z"} <= set(fields):
         raise InputError("has no fields x, y and z")
-    if {"normal_x", "normal_y", "normal_z"} <= set(fields):
-        wanted += ["normal_x", "normal_y", "normal_z"]
-    places = [fields.index(name) for name in wanted]
-    if any(counts[place] != 1 for place in places):
+    if any(counts[fields.index(axis)] != 1 for axis in "xyz"):
         raise InputError("has more than one value in a coordinate field")
     widths = [kind.itemsize * n for kind, n in zip(kinds, counts, strict=True)]
     offsets = np.cumsum([0, *widths]).tolist()
     size = count * sum(widths)
+    wanted = [k for k, name in enumerate(fields) if counts[k] == 1 and name != "_"]
     if encoding == "ascii":
-        columns = np.cumsum([0, *counts]).tolist()
-        values = table(text_lines(body)[:count], tuple(columns[place] for place in places))
+        places = np.cumsum([0, *counts]).tolist()
+        values = table(text_lines(body)[:count], tuple(places[k] for k in wanted))
         if len(values) != count:
             raise InputError(f"ends early: {count} points are announced, {len(values)} follow")
+        columns = {
+            fields[k]: values[:, at].astype(kinds[k] if fields[k] in PACKED else np.float64)
+            for at, k in enumerate(wanted)
+        }
     else:
+        strides = [sum(widths)] * len(kinds)
         if encoding == "binary_compressed":
             packed, unpacked = struct.unpack_from("<II", body)
             if unpacked != size:
@@ -106,18 +145,34 @@ def pcd(data: bytes) -> Content:
             body = lzf_decompressed(body[8 : 8 + packed], size)
             offsets = [count * offset for offset in offsets]  # one field after the other
             strides = [kind.itemsize for kind in kinds]
-        else:
-            strides = [sum(widths)] * len(kinds)
         if len(body) < size:
             raise InputError(f"ends early: {count} points take {size} bytes")
-        values = np.stack(
-            [
-                np.ndarray((count,), kinds[p], body, offsets[p], (strides[p],)).astype(np.float64)
-                for p in places
-            ],
-            axis=1,
-        )
-    return points_content(values[:, :3], values[:, 3:] if len(wanted) == 6 else None)
+        columns = {
+            fields[k]: np.ndarray((count,), kinds[k], body, offsets[k], (strides[k],)).copy()
+            for k in wanted
+        }
+    points = np.stack([columns.pop(axis) for axis in "xyz"], axis=1).astype(np.float64)
+    normals = None
+    if set(PCD_NORMALS) <= set(columns):
+        normals = np.stack([columns.pop(name) for name in PCD_NORMALS], axis=1).astype(np.float64)
+    return points_content(points, normals, _pcd_attributes(columns))
+
+
+PACKED = {"rgb": 3, "rgba": 4}
+"""Fields that hold the bytes blue, green, red (and alpha) of a colour, and how many count."""
+PCD_NORMALS = ("normal_x", "normal_y", "normal_z")
+
+
+def _pcd_attributes(columns: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
+    """Attributes of PCD fields, packed colours unpacked."""
+    attributes = {}
+    for name, parts in PACKED.items():
+        if name in columns and columns[name].dtype.itemsize == 4:
+            four = np.ascontiguousarray(columns.pop(name)).view(np.uint8).reshape(-1, 4)
+            colours = four[:, [2, 1, 0, 3][:parts]]
+            # Many writers leave alpha at 0 throughout, and mean opaque.
+            attributes["colours"] = colours[:, :3] if not four[:, 3].any() else colours
+    return attributes | named_attributes(columns)
 
 
 def _pcd_header(

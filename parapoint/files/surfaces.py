@@ -7,13 +7,11 @@ see `parapoint.files.mesh_formats`). Every fault of a file is one InputError tha
 from __future__ import annotations
 
 import logging
-import os
 import struct
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +19,7 @@ import numpy.typing as npt
 from parapoint.errors import InputError
 from parapoint.files import mesh_formats, point_formats
 from parapoint.files.mesh_formats import NO_UV, Content
+from parapoint.files.targets import beside, complete_file, sealed_png, sealed_text
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import (
     BoolArray,
@@ -46,9 +45,6 @@ FORMATS: dict[str, Callable[[bytes, Path], Content]] = {
     ".laz": lambda data, _: point_formats.las(data),
 }
 """Reader of each file name ending; it gets the bytes and the folder of the file."""
-
-ROWS_WRITTEN = 65_536
-"""Points written at a time, which bounds the memory that their text takes beside them."""
 
 UV_FORMATS = (".obj", ".glb", ".gltf")
 
@@ -238,7 +234,8 @@ def _point_cloud(content: Content, path: Path) -> PointCloud:
     if normals is not None and not np.isfinite(normals).all():
         logger.warning("%s: normals left out: some are not finite", path)
         normals = None
-    return PointCloud(content.vertices[finite], normals, int((~finite).sum()))
+    attributes = {name: values[finite] for name, values in content.attributes.items()}
+    return PointCloud(content.vertices[finite], normals, int((~finite).sum()), attributes)
 
 
 def write_obj(
@@ -268,12 +265,12 @@ def write_obj(
         )
     material = ""
     if texture is not None:
-        image, library = path.with_suffix(".png"), path.with_suffix(".mtl")
-        pixels = png(texture)
+        image, library = beside(path, ".png"), beside(path, ".mtl")
+        pixels = sealed_png(png(texture))
         with complete_file(image) as file:
             file.write(pixels)
         with complete_file(library) as file:
-            file.write(f"newmtl map\nKd 1 1 1\nmap_Kd {image.name}\n".encode())
+            file.write(sealed_text(f"newmtl map\nKd 1 1 1\nmap_Kd {image.name}\n"))
         material = f"mtllib {library.name}\nusemtl map\n"
     corners = np.stack([mesh.faces, parameterization.corners], axis=2).reshape(-1, 6) + 1
     lines = [
@@ -284,76 +281,6 @@ def write_obj(
     ]
     with complete_file(path) as file:
         file.write("".join(lines).encode())
-
-
-def write_points(path: str | Path, cloud: PointCloud, uv: FloatArray) -> None:
-    """Write points and their UV: .ply (properties u and v), .npz (points, uv) or .obj (v, vt).
-
-    Normals are carried where the cloud has them.
-
-    Raises:
-        InputError: another ending; `uv` is not finite or not (P, 2).
-        OSError: the file cannot be written; nothing is left behind.
-    """
-    path = Path(path)
-    uv = read_only(uv, np.float64, "uv", 2)
-    if len(uv) != len(cloud.points):
-        raise InputError(f"{path}: {len(uv)} uv for {len(cloud.points)} points")
-    arrays = {"points": cloud.points, "normals": cloud.normals, "uv": uv}
-    given = {name: values for name, values in arrays.items() if values is not None}
-    writers: dict[str, Callable[[IO[bytes], dict[str, FloatArray]], None]] = {
-        ".ply": _write_ply_points,
-        ".npz": lambda file, columns: np.savez_compressed(file, **columns),  # type: ignore[arg-type]  # its allow_pickle flag is no array
-        ".obj": _write_obj_points,
-    }
-    writer = writers.get(path.suffix.lower())
-    if writer is None:
-        raise InputError(f"{path}: points are written as {', '.join(writers)}")
-    with complete_file(path) as file:
-        writer(file, given)
-
-
-def _write_ply_points(file: IO[bytes], columns: dict[str, FloatArray]) -> None:
-    """Little-endian PLY with float64 properties."""
-    names = {"points": "x y z", "normals": "nx ny nz", "uv": "u v"}
-    properties = " ".join(names[name] for name in columns).split()
-    header = [
-        "ply",
-        "format binary_little_endian 1.0",
-        f"element vertex {len(columns['points'])}",
-        *(f"property double {name}" for name in properties),
-        "end_header\n",
-    ]
-    file.write("\n".join(header).encode())
-    for rows in _slices(len(columns["points"])):
-        part = [values[rows] for values in columns.values()]
-        file.write(np.concatenate(part, axis=1).astype("<f8").tobytes())
-
-
-def _write_obj_points(file: IO[bytes], columns: dict[str, FloatArray]) -> None:
-    """OBJ without faces: row k of v, vn and vt is point k."""
-    keys = {"points": "v", "normals": "vn", "uv": "vt"}
-    for name, values in columns.items():
-        for rows in _slices(len(values)):
-            lines = (" ".join(map(repr, row)) for row in values[rows].tolist())
-            file.write("".join(f"{keys[name]} {line}\n" for line in lines).encode())
-
-
-def _slices(count: int) -> Iterator[slice]:
-    """Rows written at a time."""
-    return (slice(k, k + ROWS_WRITTEN) for k in range(0, count, ROWS_WRITTEN))
-
-
-@contextmanager
-def complete_file(path: Path) -> Iterator[IO[bytes]]:
-    """A file to write, which takes its name only at the end: nobody ever sees half of it."""
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with unfinished.open("wb") as file:
-            yield file
-        unfinished.replace(path)
-    finally:
-        unfinished.unlink(missing_ok=True)
 
 
 def png(pixels: npt.NDArray[np.uint8]) -> bytes:

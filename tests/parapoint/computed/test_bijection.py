@@ -204,3 +204,11 @@ def test_a_strip_of_width_a_half_that_winds_around_a_circle(
         mesh = Mesh(np.pad(uv, ((0, 0), (0, 1))), grid(31, 2)[:, ::-1])
         assert (signed_areas(uv, mesh.faces) > 0).all()
         assert is_bijective(mesh, uv) == is_apart
+
+
+def test_the_two_long_sides_of_a_slanted_strip_do_not_cross() -> None:
+    # Their boxes overlap, but all of one is to the left of the other.
+    uv = np.array([[0.2, 0.05], [1.3, 1.15], [1.0, 1.0], [0.0, 0.0]])
+    mesh = Mesh(np.pad(uv, ((0, 0), (0, 1))), [[0, 1, 2], [0, 2, 3]])
+    assert (signed_areas(uv, mesh.faces) > 0).all()
+    assert is_bijective(mesh, uv)

@@ -235,7 +235,7 @@ def test_cuts_are_at_most_2_2_percent_of_the_faces_of_an_open_surface() -> None:
 
 
 def test_cuts_are_at_most_3_7_percent_of_the_faces_of_a_closed_surface() -> None:
-    # The same plate is closed by 80 triangles to a point below: of 1,408 faces, so 52 edges are cut
+    # The same plate, closed by 80 triangles to a point below, has 1,408 faces, so 52 edges are cut
     # at most, those that open it to a disk among them. Cuts to all pins would take 74.
     plate = plate_with_pins(21, [(220, 16), (213, 14), (227, 14)])
     (rim,) = plate.boundary_loops
