@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,7 @@ class Content:
         normals: (V, 3) vertex normals, or None.
         uv: (T, 2) texture coordinates, or None.
         uv_corners: like `corners`, rows of `uv`; NO_UV where a corner has none.
+        attributes: whatever else is known at each vertex, (V,) or (V, k) by name; see `PointCloud`.
     """
 
     vertices: FloatArray
@@ -36,12 +37,17 @@ class Content:
     normals: FloatArray | None = None
     uv: FloatArray | None = None
     uv_corners: IntArray | None = None
+    attributes: dict[str, npt.NDArray[Any]] = field(default_factory=dict)
 
 
-def points_content(points: FloatArray, normals: FloatArray | None = None) -> Content:
+def points_content(
+    points: FloatArray,
+    normals: FloatArray | None = None,
+    attributes: dict[str, npt.NDArray[Any]] | None = None,
+) -> Content:
     """The content of a file without faces."""
     none = np.zeros(0, dtype=np.int64)
-    return Content(points, none, none, normals)
+    return Content(points, none, none, normals, attributes=attributes or {})
 
 
 def floats(words: Iterable[Any], columns: int) -> FloatArray:

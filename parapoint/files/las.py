@@ -8,6 +8,7 @@ import struct
 import numpy as np
 
 from parapoint.errors import InputError
+from parapoint.files.attributes import named_attributes
 from parapoint.files.content import Content, points_content
 
 
@@ -29,4 +30,11 @@ def las(data: bytes) -> Content:
         raise InputError(f"ends early: {points} points are announced")
     if 54 * records + 60 * extended > len(data):
         raise InputError(f"ends early: {records + extended} variable records are announced")
-    return points_content(np.asarray(laspy.read(io.BytesIO(data)).xyz, dtype=np.float64))
+    read = laspy.read(io.BytesIO(data))
+    names = [name for name in read.point_format.dimension_names if name not in "XYZ"]
+    columns = {name: np.asarray(read[name]) for name in names}
+    if all(name in columns and not columns[name].any() for name in ("red", "green", "blue")):
+        for name in ("red", "green", "blue"):  # room for colours that were never taken
+            del columns[name]
+    points = np.asarray(read.xyz, dtype=np.float64)
+    return points_content(points, attributes=named_attributes(columns))

@@ -7,34 +7,43 @@ what is a header and a table.
 from __future__ import annotations
 
 import struct
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from parapoint.errors import InputError
+from parapoint.files.attributes import named_attributes
 from parapoint.files.content import Content, points_content
 from parapoint.files.xyz import table, text_lines
+
+PACKED = {"rgb": 3, "rgba": 4}
+"""Fields that hold the bytes blue, green, red (and alpha) of a colour, and how many count."""
+PCD_NORMALS = ("normal_x", "normal_y", "normal_z")
 
 
 def pcd(data: bytes) -> Content:
     """PCD of the Point Cloud Library: ascii, binary and binary_compressed."""
     fields, kinds, counts, count, encoding, body = _pcd_header(data)
-    wanted = ["x", "y", "z"]
-    if not set(wanted) <= set(fields):
+    if not {"x", "y", "z"} <= set(fields):
         raise InputError("has no fields x, y and z")
-    if {"normal_x", "normal_y", "normal_z"} <= set(fields):
-        wanted += ["normal_x", "normal_y", "normal_z"]
-    places = [fields.index(name) for name in wanted]
-    if any(counts[place] != 1 for place in places):
+    if any(counts[fields.index(axis)] != 1 for axis in "xyz"):
         raise InputError("has more than one value in a coordinate field")
     widths = [kind.itemsize * n for kind, n in zip(kinds, counts, strict=True)]
     offsets = np.cumsum([0, *widths]).tolist()
     size = count * sum(widths)
+    wanted = [k for k, name in enumerate(fields) if counts[k] == 1 and name != "_"]
     if encoding == "ascii":
-        columns = np.cumsum([0, *counts]).tolist()
-        values = table(text_lines(body)[:count], tuple(columns[place] for place in places))
+        places = np.cumsum([0, *counts]).tolist()
+        values = table(text_lines(body)[:count], tuple(places[k] for k in wanted))
         if len(values) != count:
             raise InputError(f"ends early: {count} points are announced, {len(values)} follow")
+        columns = {
+            fields[k]: values[:, at].astype(kinds[k] if fields[k] in PACKED else np.float64)
+            for at, k in enumerate(wanted)
+        }
     else:
+        strides = [sum(widths)] * len(kinds)
         if encoding == "binary_compressed":
             packed, unpacked = struct.unpack_from("<II", body)
             if unpacked != size:
@@ -42,18 +51,29 @@ def pcd(data: bytes) -> Content:
             body = lzf_decompressed(body[8 : 8 + packed], size)
             offsets = [count * offset for offset in offsets]  # one field after the other
             strides = [kind.itemsize for kind in kinds]
-        else:
-            strides = [sum(widths)] * len(kinds)
         if len(body) < size:
             raise InputError(f"ends early: {count} points take {size} bytes")
-        values = np.stack(
-            [
-                np.ndarray((count,), kinds[p], body, offsets[p], (strides[p],)).astype(np.float64)
-                for p in places
-            ],
-            axis=1,
-        )
-    return points_content(values[:, :3], values[:, 3:] if len(wanted) == 6 else None)
+        columns = {
+            fields[k]: np.ndarray((count,), kinds[k], body, offsets[k], (strides[k],)).copy()
+            for k in wanted
+        }
+    points = np.stack([columns.pop(axis) for axis in "xyz"], axis=1).astype(np.float64)
+    normals = None
+    if set(PCD_NORMALS) <= set(columns):
+        normals = np.stack([columns.pop(name) for name in PCD_NORMALS], axis=1).astype(np.float64)
+    return points_content(points, normals, _pcd_attributes(columns))
+
+
+def _pcd_attributes(columns: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
+    """Attributes of PCD fields, packed colours unpacked."""
+    attributes = {}
+    for name, parts in PACKED.items():
+        if name in columns and columns[name].dtype.itemsize == 4:
+            four = np.ascontiguousarray(columns.pop(name)).view(np.uint8).reshape(-1, 4)
+            colours = four[:, [2, 1, 0, 3][:parts]]
+            # Many writers leave alpha at 0 throughout, and mean opaque.
+            attributes["colours"] = colours[:, :3] if not four[:, 3].any() else colours
+    return attributes | named_attributes(columns)
 
 
 def _pcd_header(

@@ -12,8 +12,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from parapoint.errors import InputError
+from parapoint.files.attributes import GEOMETRY, named_attributes
 from parapoint.files.content import Content, floats, integers, ranges, strip_triangles, whole
 from parapoint.surfaces.surface import FloatArray, IntArray
 
@@ -80,7 +82,7 @@ def ply(data: bytes) -> Content:
     raw = data[match.end() :]
     body = _Body(raw, None if encoding else floats(raw.split(), 1).reshape(-1))
     at = 0
-    columns: dict[str, FloatArray] = {}
+    columns: dict[str, npt.NDArray[Any]] = {}
     sizes = corners = np.zeros(0, dtype=np.int64)
     for name, count, properties in elements:
         if name == "vertex":
@@ -94,11 +96,16 @@ def ply(data: bytes) -> Content:
                 sizes, corners = np.full(len(triangles), 3), triangles.reshape(-1)
     if not all(axis in columns for axis in "xyz"):
         raise InputError("has no vertex element with x, y and z")
-    vertices = np.stack([columns[axis] for axis in "xyz"], axis=1)
+    vertices = _stacked(columns, "x", "y", "z")
     normals = None
     if all(axis in columns for axis in ("nx", "ny", "nz")):
-        normals = np.stack([columns[axis] for axis in ("nx", "ny", "nz")], axis=1)
-    return Content(vertices, sizes, corners, normals)
+        normals = _stacked(columns, "nx", "ny", "nz")
+    return Content(vertices, sizes, corners, normals, attributes=named_attributes(columns))
+
+
+def _stacked(columns: dict[str, npt.NDArray[Any]], *names: str) -> FloatArray:
+    """(n, 3) of three columns."""
+    return np.stack([columns[name] for name in names], axis=1, dtype=np.float64, casting="unsafe")
 
 
 def _ply_header(lines: list[str]) -> tuple[str, list[tuple[str, int, list[_Property]]]]:
@@ -134,22 +141,27 @@ def _ply_header(lines: list[str]) -> tuple[str, list[tuple[str, int, list[_Prope
 
 def _ply_table(
     body: _Body, at: int, count: int, properties: list[_Property]
-) -> tuple[dict[str, FloatArray], int]:
+) -> tuple[dict[str, npt.NDArray[Any]], int]:
     """Columns of an element without lists, by property name, and the unit behind it."""
     if any(item.count_type is not None for item in properties):
         raise InputError("has lists among its vertex properties, which is not read")
-    widths = [body.width(item.type) for item in properties]
-    if not widths:
+    if not properties:
         return {}, at
-    end = at + count * sum(widths)
+    width = sum(body.width(item.type) for item in properties)
+    end = at + count * width
     if end > body.size:
         raise InputError(f"ends early: {count} vertices are announced")
-    rows = at + sum(widths) * np.arange(count)
-    offsets = np.cumsum([0, *widths])
+    if body.numbers is not None:
+        rows = body.numbers[at:end].reshape(count, width)
+        return {
+            item.name: rows[:, k].astype(item.type if item.name not in GEOMETRY else np.float64)
+            for k, item in enumerate(properties)
+        }, end
+    kind = np.dtype([(f"{k}", item.type) for k, item in enumerate(properties)])
+    table = np.frombuffer(body.raw, kind, count, at)
     return {
-        item.name: body.values(rows + offset, item.type)
-        for item, offset in zip(properties, offsets.tolist(), strict=False)
-        if item.name in {"x", "y", "z", "nx", "ny", "nz"}
+        item.name: table[f"{k}"].astype(item.type.newbyteorder("="))
+        for k, item in enumerate(properties)
     }, end
 
 

@@ -213,4 +213,5 @@ def _point_cloud(content: Content, path: Path) -> PointCloud:
     if normals is not None and not np.isfinite(normals).all():
         logger.warning("%s: normals left out: some are not finite", path)
         normals = None
-    return PointCloud(content.vertices[finite], normals, int((~finite).sum()))
+    attributes = {name: values[finite] for name, values in content.attributes.items()}
+    return PointCloud(content.vertices[finite], normals, int((~finite).sum()), attributes)

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 
 from parapoint.errors import InputError
+from parapoint.files.attributes import colours_of
 from parapoint.files.content import Content, points_content
 from parapoint.surfaces.surface import FloatArray
 
@@ -27,20 +31,48 @@ def text_lines(data: bytes) -> list[bytes]:
 
 
 def xyz(data: bytes) -> Content:
-    """Text with x y z in each line; three further columns are normals if all have length 1."""
+    """Text with x y z in each line, and whatever columns a scanner adds; see `_further_columns`."""
     lines = text_lines(data)
     if lines and len(lines[0].split()) == 1:
         lines = lines[1:]  # a count on its own, as scanners write it
     if not lines:
         raise InputError("has no point")
-    if len(lines[0].split()) < 6:
-        return points_content(table(lines, (0, 1, 2)))
-    values = table(lines, (0, 1, 2, 3, 4, 5))
-    normals = values[:, 3:]
+    try:
+        values = table(lines, tuple(range(len(lines[0].split()))))
+    except ValueError:  # words, or not in all lines: the coordinates alone
+        values = table(lines, (0, 1, 2))
+    if values.shape[1] < 3:
+        raise InputError("has fewer than three numbers in a line")
+    return points_content(values[:, :3], *_further_columns(values))
+
+
+def _further_columns(
+    values: FloatArray,
+) -> tuple[FloatArray | None, dict[str, npt.NDArray[Any]]]:
+    """Normals, or None, and attributes in the columns behind x y z of (P, 3 + k) numbers.
+
+    Three columns together are normals where all have length 1, and colours where all are whole
+    numbers from 0 to 255 or fractions from 0 to 1. Single columns come before them, as in PTS: the
+    first is the intensity.
+    """
     finite = np.isfinite(values).all(axis=1)
-    length = np.linalg.norm(np.clip(normals[finite], -2, 2), axis=1)  # clipped: no overflow
-    unit = bool(len(length)) and bool((np.abs(length - 1) < 1e-3).all())
-    return points_content(values[:, :3], normals if unit else None)
+    normals: FloatArray | None = None
+    attributes: dict[str, npt.NDArray[Any]] = {}
+    columns = values.shape[1]
+    single = (columns - 3) % 3
+    for at in range(3, 3 + single):
+        attributes["intensity" if at == 3 else f"column{at + 1}"] = values[:, at]
+    for at in range(3 + single, columns, 3):
+        three = values[:, at : at + 3]
+        length = np.linalg.norm(np.clip(three[finite], -2, 2), axis=1)  # clipped: no overflow
+        colours = colours_of(three)
+        if normals is None and len(length) and (np.abs(length - 1) < 1e-3).all():
+            normals = three
+        elif "colours" not in attributes and colours is not None and colours.dtype != np.uint16:
+            attributes["colours"] = colours
+        else:
+            attributes |= {f"column{at + k + 1}": three[:, k] for k in range(3)}
+    return normals, attributes
 
 
 def pts(data: bytes) -> Content:

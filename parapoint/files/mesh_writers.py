@@ -1,12 +1,10 @@
-"""Surfaces and maps to files: OBJ, PLY and NPZ."""
+"""Writers of meshes with their UV."""
 
 from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 import numpy.typing as npt
@@ -14,10 +12,7 @@ import numpy.typing as npt
 from parapoint.errors import InputError
 from parapoint.files.targets import beside, complete_file, sealed_png, sealed_text
 from parapoint.surfaces.parameterization import Parameterization
-from parapoint.surfaces.surface import FloatArray, Mesh, PointCloud, read_only
-
-ROWS_WRITTEN = 65_536
-"""Points written at a time, which bounds the memory that their text takes beside them."""
+from parapoint.surfaces.surface import Mesh
 
 
 def write_obj(
@@ -63,64 +58,6 @@ def write_obj(
     ]
     with complete_file(path) as file:
         file.write("".join(lines).encode())
-
-
-def write_points(path: str | Path, cloud: PointCloud, uv: FloatArray) -> None:
-    """Write points and their UV: .ply (properties u and v), .npz (points, uv) or .obj (v, vt).
-
-    Normals are carried where the cloud has them.
-
-    Raises:
-        InputError: another ending; `uv` is not finite or not (P, 2).
-        OSError: the file cannot be written; nothing is left behind.
-    """
-    path = Path(path)
-    uv = read_only(uv, np.float64, "uv", 2)
-    if len(uv) != len(cloud.points):
-        raise InputError(f"{path}: {len(uv)} uv for {len(cloud.points)} points")
-    arrays = {"points": cloud.points, "normals": cloud.normals, "uv": uv}
-    given = {name: values for name, values in arrays.items() if values is not None}
-    writers: dict[str, Callable[[IO[bytes], dict[str, FloatArray]], None]] = {
-        ".ply": _write_ply_points,
-        ".npz": lambda file, columns: np.savez_compressed(file, **columns),  # type: ignore[arg-type]  # its allow_pickle flag is no array
-        ".obj": _write_obj_points,
-    }
-    writer = writers.get(path.suffix.lower())
-    if writer is None:
-        raise InputError(f"{path}: points are written as {', '.join(writers)}")
-    with complete_file(path) as file:
-        writer(file, given)
-
-
-def _write_ply_points(file: IO[bytes], columns: dict[str, FloatArray]) -> None:
-    """Little-endian PLY with float64 properties."""
-    names = {"points": "x y z", "normals": "nx ny nz", "uv": "u v"}
-    properties = " ".join(names[name] for name in columns).split()
-    header = [
-        "ply",
-        "format binary_little_endian 1.0",
-        f"element vertex {len(columns['points'])}",
-        *(f"property double {name}" for name in properties),
-        "end_header\n",
-    ]
-    file.write("\n".join(header).encode())
-    for rows in _slices(len(columns["points"])):
-        part = [values[rows] for values in columns.values()]
-        file.write(np.concatenate(part, axis=1).astype("<f8").tobytes())
-
-
-def _write_obj_points(file: IO[bytes], columns: dict[str, FloatArray]) -> None:
-    """OBJ without faces: row k of v, vn and vt is point k."""
-    keys = {"points": "v", "normals": "vn", "uv": "vt"}
-    for name, values in columns.items():
-        for rows in _slices(len(values)):
-            lines = (" ".join(map(repr, row)) for row in values[rows].tolist())
-            file.write("".join(f"{keys[name]} {line}\n" for line in lines).encode())
-
-
-def _slices(count: int) -> Iterator[slice]:
-    """Rows written at a time."""
-    return (slice(k, k + ROWS_WRITTEN) for k in range(0, count, ROWS_WRITTEN))
 
 
 def png(pixels: npt.NDArray[np.uint8]) -> bytes:
