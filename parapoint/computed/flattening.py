@@ -65,6 +65,16 @@ class FlatMap(NamedTuple):
     facts: dict[str, Any]
     charted: Charted
 
+    def turned(self) -> FlatMap:
+        """The same map seen from the other side of the surface: mirrored."""
+        mirror = np.array([-1.0, 1.0])
+        return self._replace(
+            uv=self.uv * mirror,
+            jacobians=self.jacobians * mirror[:, None],
+            inverse_jacobians=self.inverse_jacobians * mirror,
+            charted=self.charted.turned(),
+        )
+
 
 class Flattened(NamedTuple):
     """A cloud as a triangle mesh, cut open and laid into the plane.

@@ -66,7 +66,7 @@ class Scattered:
         weights *= 1 - np.einsum("nkd,nd->nk", offsets, slope)
         known = self.values[near].astype(np.float64)
         fitted = np.einsum("nk,nkc->nc", weights, known)
-        return np.clip(fitted, known.min(axis=1), known.max(axis=1))
+        return np.asarray(np.clip(fitted, known.min(axis=1), known.max(axis=1)))
 
 
 def _solved(matrices: FloatArray, sides: FloatArray) -> FloatArray:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple, Self
 
 import numpy as np
+import numpy.typing as npt
 
-from parapoint.files.mesh_formats import ranges
+from parapoint.files.content import ranges
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray
 
@@ -15,32 +18,76 @@ RIM = 1.5
 edge reads texels up to so far outside of it."""
 EXTENDED = 1.0
 """How far a triangle is continued at most, in its own barycentric coordinates."""
+FLAT = 1e-9
+"""Doubled area, in texels, below which a triangle counts as without area."""
 CANDIDATES = 2_000_000
 """Pairs of a texel and a triangle that are compared at a time, which bounds the memory to some
 200 MB."""
 
 
-class Texels(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Texels:
     """The K texels of a square image that show a surface.
 
     Attributes:
+        charted: the mesh and its map, which fills part of the unit square; v runs upwards.
         size: texels along a side of the image.
         places: (K,) row-major index of the texel, first row at the top.
         faces: (K,) the triangle it shows.
-        weights: (K, 3) barycentric coordinates of its centre in that triangle; on the rim some are
-            negative.
-        inside: (K,) whether the centre lies in the triangle; the others are the rim.
+        inside: (K,) whether its centre lies in the triangle; the others are the rim.
     """
 
+    charted: Charted
     size: int
     places: IntArray
-    faces: IntArray
-    weights: FloatArray
+    faces: npt.NDArray[np.int32]
     inside: BoolArray
 
-    def interpolated(self, corner_values: FloatArray) -> FloatArray:
-        """(K, k) values at the texels of values (F, 3, k) at the corners of the triangles."""
-        return np.asarray(np.einsum("nc,nck->nk", self.weights, corner_values[self.faces]))
+    def weights(self, rows: slice) -> FloatArray:
+        """(k, 3) barycentric coordinates of some texels' centres in their triangles.
+
+        On the rim some are negative, no further than -EXTENDED.
+        """
+        places, faces = self.places[rows], self.faces[rows]
+        centres = np.stack([places % self.size, self.size - 1 - places // self.size], axis=1) + 0.5
+        weights = self._plane.weights(centres, faces)
+        weights = np.clip(weights, -EXTENDED, 1 + EXTENDED)
+        return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+
+    @cached_property
+    def _plane(self) -> _Triangles:
+        return _Triangles.of(self.charted, self.size)
+
+
+class _Triangles(NamedTuple):
+    """Triangles in the plane, in texels.
+
+    Attributes:
+        corners: (F, 3, 2).
+        gradients: (F, 3, 2) of the barycentric coordinates; 0 of triangles without area.
+        flat: (F,) which have no area.
+    """
+
+    corners: FloatArray
+    gradients: FloatArray
+    flat: BoolArray
+
+    @classmethod
+    def of(cls, charted: Charted, size: int) -> Self:
+        corners = charted.map.uv[charted.map.corners] * size
+        edges = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)  # opposite each corner
+        doubled = edges[:, 2, 0] * -edges[:, 1, 1] - edges[:, 2, 1] * -edges[:, 1, 0]
+        flat = np.abs(doubled) < FLAT
+        gradients = np.stack([-edges[..., 1], edges[..., 0]], axis=2)
+        gradients = np.where(flat, 0.0, 1 / np.where(flat, 1.0, doubled))[:, None, None] * gradients
+        return cls(corners, gradients, flat)
+
+    def weights(self, at: npt.NDArray[np.floating], faces: npt.NDArray[np.integer]) -> FloatArray:
+        """(n, 3) barycentric coordinates of points (n, 2) in these triangles."""
+        offset = at - self.corners[faces, 1]
+        first = (self.gradients[faces, 0] * offset).sum(axis=1)
+        third = (self.gradients[faces, 2] * offset).sum(axis=1)
+        return np.stack([first, 1 - first - third, third], axis=1)
 
 
 def texels(charted: Charted, size: int) -> Texels:
@@ -49,53 +96,30 @@ def texels(charted: Charted, size: int) -> Texels:
     Where triangles lie on one another the texel shows the one in which its centre lies deepest.
     Triangles without area in the plane show nowhere.
     """
-    uv = charted.map.uv * size
-    triangles = uv[charted.map.corners]  # (F, 3, 2) in texels
-    low = np.clip(np.floor(triangles.min(axis=1) - RIM), 0, size).astype(np.int64)
-    high = np.clip(np.ceil(triangles.max(axis=1) + RIM), 0, size).astype(np.int64)
-    extent = np.maximum(high - low, 0)
-    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
-    doubled = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    flat = np.abs(doubled) < 1e-12 * size
-    count = np.where(flat, 0, extent.prod(axis=1))
-    # One triangle's gradients of the barycentric coordinates, (F, 3, 2).
-    edges = np.stack([c - b, a - c, b - a], axis=1)
-    gradients = np.stack([-edges[..., 1], edges[..., 0]], axis=2)
-    gradients /= np.where(flat, 1.0, doubled)[:, None, None]
-    steepness = np.linalg.norm(gradients, axis=2)
-
+    plane = _Triangles.of(charted, size)
+    low = np.clip(np.floor(plane.corners.min(axis=1) - RIM), 0, size).astype(np.int64)
+    high = np.clip(np.ceil(plane.corners.max(axis=1) + RIM), 0, size).astype(np.int64)
+    extent = high - low
+    count = np.where(plane.flat, 0, extent.prod(axis=1))
+    steepness = np.linalg.norm(plane.gradients, axis=2)
     depth = np.full(size * size, -RIM, dtype=np.float32)
-    face_of = np.full(size * size, -1, dtype=np.int64)
+    face_of = np.full(size * size, -1, dtype=np.int32)
     ends = np.cumsum(count)
     begin = 0
     while begin < len(count):
         before = ends[begin - 1] if begin else 0
         end = max(begin + 1, int(np.searchsorted(ends, before + CANDIDATES, side="right")))
-        some = np.arange(begin, end)
-        begin = end
-        face = np.repeat(some, count[some])
-        at = ranges(np.zeros(len(some), dtype=np.int64), count[some])
-        column = low[face, 0] + at % np.maximum(extent[face, 0], 1)
-        line = low[face, 1] + at // np.maximum(extent[face, 0], 1)
-        weights = _weights(np.stack([column, line], axis=1) + 0.5, b, face, gradients)
+        run = count[begin:end]
+        face = np.repeat(np.arange(begin, end), run)
+        line, column = np.divmod(ranges(np.zeros_like(run), run), np.maximum(extent[face, 0], 1))
+        line, column = line + low[face, 1], column + low[face, 0]
+        weights = plane.weights(np.stack([column, line], axis=1) + 0.5, face)
         # Distance to the nearest side, in texels; negative outside.
         near = (weights / steepness[face]).min(axis=1).astype(np.float32)
         place = (size - 1 - line) * size + column
         better = np.flatnonzero(near > depth[place])
         better = better[np.argsort(near[better], kind="stable")]  # of one texel the last one stays
         depth[place[better]], face_of[place[better]] = near[better], face[better]
+        begin = end
     places = np.flatnonzero(face_of >= 0)
-    faces = face_of[places]
-    centres = np.stack([places % size, size - 1 - places // size], axis=1) + 0.5
-    weights = _weights(centres, b, faces, gradients)
-    weights = np.clip(weights, -EXTENDED, 1 + EXTENDED)
-    weights /= weights.sum(axis=1, keepdims=True)
-    return Texels(size, places, faces, weights, depth[places] >= 0)
-
-
-def _weights(at: FloatArray, second: FloatArray, face: IntArray, gradients: FloatArray) -> FloatArray:
-    """(n, 3) barycentric coordinates of places (n, 2) in their triangles."""
-    offset = at - second[face]
-    first = (gradients[face, 0] * offset).sum(axis=1)
-    third = (gradients[face, 2] * offset).sum(axis=1)
-    return np.stack([first, 1 - first - third, third], axis=1)
+    return Texels(charted, size, places, face_of[places], depth[places] >= 0)
