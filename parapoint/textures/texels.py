@@ -13,11 +13,11 @@ from parapoint.files.content import ranges
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray
 
-RIM = 1.5
+RIM = 1.4
 """Texels around a chart that continue the triangle beside them: bilinear sampling at the chart's
 edge reads texels up to so far outside of it."""
-EXTENDED = 1.0
-"""How far a triangle is continued at most, in its own barycentric coordinates."""
+EXTENDED = 1.5
+"""How far from its middle a triangle is continued at most, in its barycentric coordinates."""
 FLAT = 1e-9
 """Doubled area, in texels, below which a triangle counts as without area."""
 CANDIDATES = 2_000_000
@@ -46,13 +46,14 @@ class Texels:
     def weights(self, rows: slice) -> FloatArray:
         """(k, 3) barycentric coordinates of some texels' centres in their triangles.
 
-        On the rim some are negative, no further than -EXTENDED.
+        On the rim some are negative; a sliver is not continued far (EXTENDED).
         """
         places, faces = self.places[rows], self.faces[rows]
         centres = np.stack([places % self.size, self.size - 1 - places // self.size], axis=1) + 0.5
         weights = self._plane.weights(centres, faces)
-        weights = np.clip(weights, -EXTENDED, 1 + EXTENDED)
-        return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+        from_middle = weights - 1 / 3
+        farthest = np.abs(from_middle).max(axis=1, keepdims=True)
+        return np.asarray(1 / 3 + from_middle * np.minimum(1, EXTENDED / np.maximum(farthest, 1)))
 
     @cached_property
     def _plane(self) -> _Triangles:
