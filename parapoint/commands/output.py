@@ -9,7 +9,9 @@ import numpy.typing as npt
 
 from parapoint.errors import InputError
 from parapoint.estimator import Estimator
-from parapoint.files.surfaces import write_obj, write_points
+from parapoint.files.mesh_writers import write_obj
+from parapoint.files.point_writers import write_points
+from parapoint.files.targets import checked_target
 from parapoint.surfaces.sampling import mean_spacing
 from parapoint.surfaces.spanning import Transform, opened, spanning_edges
 from parapoint.surfaces.surface import Mesh, PointCloud, Surface
@@ -18,16 +20,22 @@ ENDINGS = (".obj", ".ply", ".npz")
 """Endings of files that a map can be written to."""
 
 
-def check_target(path: str) -> None:
-    """Check that a map can be written to a file.
+def target(out: str, surface: str, *, force: bool) -> str:
+    """The file to write for `out`, checked before any work (`parapoint.files.targets`).
+
+    Args:
+        out: the file that the user named.
+        surface: the file that is read.
+        force: replace whatever is there.
 
     Raises:
-        InputError: its ending is none of ENDINGS, or its folder does not exist.
+        InputError: its ending is none of ENDINGS, or it cannot or may not be written.
     """
-    if Path(path).suffix.lower() not in ENDINGS:
-        raise InputError(f"{path}: cannot write this ending; take {', '.join(ENDINGS)}")
-    if not Path(path).absolute().parent.is_dir():
-        raise InputError(f"{path}: there is no such folder; make it first")
+    ending = Path(out).suffix.lower()
+    if ending not in ENDINGS:
+        raise InputError(f"{out}: cannot write this ending; take {', '.join(ENDINGS)}")
+    sides = (".mtl", ".png") if ending == ".obj" else ()
+    return str(checked_target(out, sides=sides, inputs=[surface], force=force))
 
 
 def write(

@@ -8,8 +8,8 @@ from typing import Any
 import click
 
 from parapoint.commands.fitting import estimator_of, fitted, summary
-from parapoint.commands.output import check_target, write
-from parapoint.files.surfaces import read_surface
+from parapoint.commands.output import target, write
+from parapoint.files.reading import read_surface
 from parapoint.surfaces.components import components
 from parapoint.textures.checkerboard import checkerboard
 
@@ -25,15 +25,16 @@ from parapoint.textures.checkerboard import checkerboard
     help="One map of all, or of each or the largest component.",
 )
 @click.option("--seed", type=int, default=0, show_default=True)
+@click.option("--force", is_flag=True, help="Replace files of yours that are in the way.")
 @click.option("--json", "as_json", is_flag=True, help="Print the report as one JSON object.")
-def unwrap(surface: str, out: str, as_json: bool, **settings: Any) -> None:
+def unwrap(surface: str, out: str, *, force: bool, as_json: bool, **settings: Any) -> None:
     """Compute the map of a mesh or a point cloud and write it, in the unit square.
 
     A mesh written as OBJ gets a checkerboard and is cut along the seams of the map: a face whose
     corners lie on both sides of one keeps its true shape, at the side of its one short edge. With
     --components largest only that one is written.
     """
-    check_target(out)
+    out = target(out, surface, force=force)
     given = read_surface(surface)
     model = fitted(surface, given, estimator_of("computed", settings))
     if model.components == "largest":

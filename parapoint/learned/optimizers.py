@@ -112,7 +112,7 @@ class SOAP:
         widest: see `WIDEST`.
     """
 
-    learning_rate: ClassVar[float] = 3e-3
+    learning_rate: ClassVar[float] = 6e-3
 
     def __init__(self, parameters: list[Tensor], widest: int = WIDEST) -> None:
         self.parameters = parameters

@@ -60,10 +60,12 @@ class ParaPoint(Estimator):
             takes the preset's value.
         points: training points.
         iterations: steps, the warm-up included.
-        time_budget: seconds of fitting; the schedule follows the time where that ends sooner.
+        time_budget: seconds of fitting; the schedule follows the time where that ends sooner, and
+            steps take as many points as leave enough of them on this machine.
         subset: points of a step before the last phase, which takes all.
         all_from: share of the run after which steps take all points.
         warm_up: share of the run that goes to the convex hull.
+        optimizer: "soap", or "adamw", the choice of the paper's group.
         distortion: "conformal" or "isometric".
         distortion_weight: its weight; the paper's text has 1e-4 for complex shapes.
         eigenvalues: "singular" or "gram", the readings of "the eigenvalues of the Jacobian".
@@ -85,6 +87,7 @@ class ParaPoint(Estimator):
     subset: int | None = None
     all_from: float | None = None
     warm_up: float | None = None
+    optimizer: str | None = None
     distortion: str | None = None
     distortion_weight: float | None = None
     eigenvalues: str | None = None
@@ -212,8 +215,10 @@ class ParaPoint(Estimator):
         return {
             "preset": self.preset,
             "points": used,
-            "points_of_a_step": min(preset.subset, used),
+            "points_of_a_step": min(trainer.subset, used),
             "iterations": trainer.iteration,
+            "optimizer": preset.optimizer,
+            "starts": trainer.starts,
             "warm_up": preset.warm_up,
             "weights": trainer.weights,
             "distortion": preset.distortion,
@@ -222,6 +227,7 @@ class ParaPoint(Estimator):
             "losses": dict(trace[-1].values) if trace else {},
             "divergences": trainer.divergences,
             "seconds": round(trainer.seconds, 3),
+            "processor_seconds": round(trainer.processor_seconds, 3),
             "device": trainer.device,
             "threads": self.threads or torch.get_num_threads(),
         }

@@ -18,6 +18,8 @@ from parapoint.learned.trained_map import new_networks
 from parapoint.learned.trainer import Trainer
 from parapoint.surfaces.surface import FloatArray
 
+NEAR = 0.01
+"""Distance, in radii of the surface, from the start's map that is good already."""
 LARGEST_ERROR = 4.0
 """Squared relative error of a Jacobian beyond which more does not count: at seams and folds of the
 start it would drown the rest."""
@@ -108,7 +110,7 @@ class TaughtTrainer(Trainer):
         wanted = torch.einsum("cni,ni->nc", gradients, points[0]) + offsets
         slopes = torch.einsum("cni,tni->tnc", gradients, frames)
         return {
-            "map": (there.uv - wanted).square().sum(1).mean(),
+            "map": distance_loss(there.uv, wanted),
             "jacobian": jacobian_loss(there.unfolding, slopes),
             "unfolding": losses.unfolding_loss(there.unfolding, self.preset.area_weight),
             "inverse": (there.points_cycle - there.points).norm(dim=1).mean(),
@@ -117,6 +119,12 @@ class TaughtTrainer(Trainer):
             + losses.cycle_loss(back.cut, back.cut_cycle),
             "wrap": losses.wrap_loss(back.points, points[0]),
         }
+
+
+def distance_loss(made: Tensor, wanted: Tensor) -> Tensor:
+    """Mean distance of points (N, 2), squared where it is below NEAR, so that spikes stay small."""
+    squared = (made - wanted).square().sum(1)
+    return ((squared + NEAR**2).sqrt() - NEAR).mean()
 
 
 def jacobian_loss(made: Tensor, wanted: Tensor) -> Tensor:

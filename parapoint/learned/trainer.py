@@ -28,6 +28,15 @@ SNAPSHOTS = 100
 """States kept in a run, evenly: the last good one is where a diverged run begins again."""
 DIVERGED = 10.0
 """A mean loss this many times the phase's lowest has diverged."""
+SHORT = 256
+"""Points of a step where a time budget allows no more."""
+TIMED = range(3, 8)
+"""Steps of so many points that are timed; those before set up what later ones use."""
+DENSER = 4
+"""Under a time budget, which steps of all points would exceed, later ones hold a lattice of so many
+times the points of a step against the cloud. A coarse one draws both sides of a finger inwards."""
+ENOUGH_STEPS = 5_000
+"""A time budget that allows more steps of SHORT points than these gives larger ones in place."""
 SMALLER_STEP = 0.3
 """Factor on the learning rate after a divergence."""
 LAST_RATE = 0.01
@@ -62,6 +71,9 @@ class Step(NamedTuple):
 _FACTS = (
     "iteration",
     "seconds",
+    "processor_seconds",
+    "subset",
+    "_timed",
     "divergences",
     "_phase_now",
     "_start",
@@ -89,12 +101,15 @@ class Trainer:
         seed: of all random draws: initial weights, subsets, perturbations.
         device: "cpu" or "cuda".
         time_budget: seconds after which the run ends; the schedule follows the time where that
-            comes before the preset's number of iterations.
+            comes before the preset's number of iterations, and the points of a step are as many as
+            leave ENOUGH_STEPS on this machine, from SHORT up to the preset's.
         networks: what to train, all its parameters; new networks of the preset by default, which
             may have several starts.
 
     Attributes:
         seconds: spent so far; what was spent before the run may be added, as part of the budget.
+        processor_seconds: time of the processor that went to the steps, all threads together.
+        subset: points of a step before the last phase.
     """
 
     def __init__(
@@ -121,7 +136,9 @@ class Trainer:
             self.hull = Cloud(self.prepared(hull), preset.patch)
         self.noise = preset.perturbation * mean_spacing(points)
         self.iteration = 0
-        self.seconds = 0.0
+        self.seconds = self.processor_seconds = 0.0
+        self.subset = preset.subset if time_budget is None else min(SHORT, preset.subset)
+        self._timed: list[float] = []
         self.divergences = 0
         self._phase_now = ""
         self._start = 0
@@ -158,7 +175,7 @@ class Trainer:
             points if self.preset.branches != "2d" else None,
             grid if self.preset.branches != "3d" else None,
         )
-        return objective_terms(self.preset, cycle, given)
+        return objective_terms(self.preset, cycle, given, self._dense_surface())
 
     @property
     def progress(self) -> float:
@@ -184,7 +201,7 @@ class Trainer:
             DivergedError: the loss blew up twice.
         """
         longest = 0.0
-        begin = time.perf_counter()
+        begin, processor = time.perf_counter(), time.process_time()
         while self.progress < 1 and self._fits(longest):
             phase = self._phase()
             if phase != self._phase_now:
@@ -194,10 +211,14 @@ class Trainer:
                 self._sums[name] = self._sums.get(name, 0.0) + value
             self._count += 1
             self.iteration += 1
-            now = time.perf_counter()
+            now, processor_now = time.perf_counter(), time.process_time()
             longest = max(longest, now - begin)
             self.seconds += now - begin  # what is done between steps counts too
-            begin = now
+            self.processor_seconds += processor_now - processor
+            if self.time_budget is not None and self.iteration in TIMED:
+                self._timed.append(now - begin)
+                self._choose_subset(self.time_budget)
+            begin, processor = now, processor_now
             means: dict[str, float] = {}
             ends_phase = self.progress == 1 or self._phase() != phase or self._start_ends()
             if ends_phase or self.progress >= self._next_snapshot:
@@ -231,6 +252,13 @@ class Trainer:
 
     def _new_networks(self) -> SubNetworks:
         return new_networks(self.preset, self.generator)
+
+    def _choose_subset(self, budget: float) -> None:
+        """Once the first steps are timed, take as many points as leave enough steps."""
+        if self.iteration == TIMED[-1]:
+            steps = (budget - self.seconds) / float(np.median(self._timed))
+            affordable = round(SHORT * max(1.0, steps / ENOUGH_STEPS))
+            self.subset = min(affordable, self.preset.subset)
 
     def _start_ends(self) -> bool:
         """Whether one of several starts is done."""
@@ -307,7 +335,8 @@ class Trainer:
     def _batch(self) -> tuple[Tensor, Tensor]:
         """Perturbed points of the phase (see `prepared`) and a perturbed lattice (about n, 2)."""
         cloud = self._cloud()
-        size = len(cloud.points) if self._phase() == "all" else self.preset.subset
+        takes_all = self._phase() == "all" and self.time_budget is None
+        size = len(cloud.points) if takes_all else self.subset
         rows = cloud.drawn(size, self.generator)
         size = rows.shape[1]
         noise = torch.zeros(rows.shape)
@@ -315,12 +344,24 @@ class Trainer:
         grid = lattice(round(math.sqrt(size)), self.generator)
         return rows + noise.to(self.device), grid.to(self.device)
 
+    def _dense_surface(self) -> Tensor | None:
+        """(DENSER · M, 3) P̂ of a lattice for the Chamfer distance alone, where one is due."""
+        is_due = self._phase() == "all" and self.time_budget is not None
+        if not is_due or self.preset.branches == "3d":
+            return None
+        networks = self.networks
+        assert isinstance(networks, SubNetworks)
+        grid = lattice(round(math.sqrt(DENSER * self.subset)), self.generator).to(self.device)
+        return networks.surface(networks.deform(grid[None])[0])
+
     def _cloud(self) -> Cloud:
         """What the phase is fitted to."""
         return self.hull if self._phase() == "hull" else self.shape
 
 
-def objective_terms(preset: Preset, cycle: Cycle, points: Tensor) -> dict[str, Tensor]:
+def objective_terms(
+    preset: Preset, cycle: Cycle, points: Tensor, made: Tensor | None = None
+) -> dict[str, Tensor]:
     """The unweighted terms of the objective; those of a branch that is left out are missing.
 
     Args:
@@ -329,6 +370,7 @@ def objective_terms(preset: Preset, cycle: Cycle, points: Tensor) -> dict[str, T
         points: (N, 3) all given points. P̂ is held against these also where a sparse subset goes
             through the networks: against the subset alone the Chamfer distance is mostly sampling
             noise, in which the terms of weight 0.01 drown.
+        made: (M, 3) what is held against them, the grid branch's own P̂ by default.
     """
     distortion = losses.DISTORTIONS[preset.distortion]
     eigenvalues = losses.EIGENVALUES[preset.eigenvalues]
@@ -345,7 +387,7 @@ def objective_terms(preset: Preset, cycle: Cycle, points: Tensor) -> dict[str, T
             terms["unfolding"] = losses.unfolding_loss(there.unfolding, preset.area_weight)
     if cycle.grid is not None:
         back = cycle.grid
-        terms["wrap"] = losses.wrap_loss(back.points, points)
+        terms["wrap"] = losses.wrap_loss(back.points if made is None else made, points)
         cycle_terms += [(back.uv, back.uv_cycle), (back.cut, back.cut_cycle)]
         tangents_at.append((back.points, back.tangents))
     K, T = preset.anti_flip_neighbours, preset.anti_flip_angle

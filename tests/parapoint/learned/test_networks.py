@@ -212,3 +212,12 @@ def test_weights_start_uniform_within_one_over_the_root_of_the_inputs() -> None:
     first, second = Stack(100, 20, (4,), ACTIVATIONS["leaky_relu"], generator()).layers
     assert 0.09 < float(first.detach().abs().max()) <= 0.1
     assert 0.45 < float(second.detach().abs().max()) <= 0.5
+
+
+def test_an_offset_of_nothing_leaves_points_and_tangents() -> None:
+    # With all weights 0 the offset is 0, and so is its derivative.
+    stack = OffsetStack(3, 4, (5,), ACTIVATIONS["squareplus"], generator())
+    for layer in stack.parameters():
+        torch.nn.init.zeros_(layer)
+    x = torch.randn(3, 7, 3, generator=generator())
+    torch.testing.assert_close(stack(x), x)

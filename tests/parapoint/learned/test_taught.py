@@ -15,7 +15,7 @@ from parapoint.learned.features import FLOOR, FeatureNetworks, Features, GatedCu
 from parapoint.learned.networks import ACTIVATIONS, SubNetworks
 from parapoint.learned.presets import LEARNED, LEARNED_FROM_HULL
 from parapoint.learned.start import Start, computed_start
-from parapoint.learned.taught import TaughtTrainer, gate_loss, jacobian_loss
+from parapoint.learned.taught import TaughtTrainer, distance_loss, gate_loss, jacobian_loss
 
 TINY = replace(LEARNED, hidden=(32, 32), embedding=4, features=8, gates=4, subset=100)
 
@@ -93,7 +93,7 @@ def test_the_map_is_made_of_networks_alone(taught: SubNetworks) -> None:
 
 
 def test_every_network_is_trained(start: Start) -> None:
-    run = trainer(start, iterations=4)
+    run = trainer(start, iterations=60, learning_rate=1.5e-2)
     before = {name: of.clone() for name, of in run.networks.state_dict().items()}
     for _ in run.run():
         pass
@@ -153,6 +153,11 @@ def test_a_gate_is_shut_where_its_reach_is_small_and_jumps_where_it_is_not() -> 
 
 
 def test_losses_of_what_is_taught() -> None:
+    place = torch.zeros(2, 2)
+    assert distance_loss(place, place) == 0
+    assert distance_loss(place, place + torch.tensor([3.0, 4.0])) == pytest.approx(5, rel=0.01)
+    near, nearer = (float(distance_loss(place, place + of)) for of in (1e-3, 5e-4))
+    assert near == pytest.approx(4 * nearer, rel=0.05)
     right = torch.eye(2)[:, None].repeat(1, 3, 1)
     assert jacobian_loss(right, right) == 0
     assert jacobian_loss(2 * right, right) == pytest.approx(1)

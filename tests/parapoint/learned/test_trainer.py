@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 import torch
 
+from parapoint.errors import InputError
 from parapoint.learned import losses, trainer
 from parapoint.learned.networks import Cycle, GridBranch, PointBranch
-from parapoint.learned.presets import PAPER
+from parapoint.learned.presets import PAPER, Preset
 from parapoint.learned.trainer import (
     DivergedError,
     Trainer,
@@ -16,7 +17,7 @@ from parapoint.learned.trainer import (
     tangent_frames,
 )
 
-TINY = replace(PAPER, hidden=(8, 8), embedding=4, subset=100, iterations=40, points=200)
+TINY = Preset(hidden=(8, 8), embedding=4, subset=100, iterations=40, points=200)
 
 
 def sphere(count: int = 200) -> np.ndarray:
@@ -118,6 +119,14 @@ def test_the_start_of_lowest_loss_goes_on(monkeypatch: pytest.MonkeyPatch) -> No
     assert np.abs(states[15] - states[7]).max() > 0.1
 
 
+def test_starts_that_would_see_nothing_but_the_hull_are_refused() -> None:
+    replace(TINY, starts=3, start_share=0.1, warm_up=0.12)
+    with pytest.raises(InputError, match=r"warm_up 0.13 is too much for starts of 0.1"):
+        replace(TINY, starts=3, start_share=0.1, warm_up=0.13)
+    with pytest.raises(InputError, match=r"start_share must be a number .* at most 0.5"):
+        replace(TINY, starts=2, start_share=0.6)
+
+
 def test_networks_that_are_given_have_one_start() -> None:
     of = several_starts()
     given = Trainer(sphere(), of.preset, seed=0, device="cpu", networks=of.networks)
@@ -143,6 +152,62 @@ def test_the_schedule_follows_a_time_budget_that_ends_first(monkeypatch) -> None
     assert steps[4].progress == pytest.approx(0.5)
     assert of._learning_rate() == pytest.approx(1e-5)
     assert [step.phase for step in steps] == ["hull"] * 3 + ["subset"] * 5 + ["all"] * 2
+
+
+@pytest.mark.parametrize(
+    ("budget", "most", "expected"),
+    [
+        (5.0, 2_048, 256),  # 1 s a step: too few steps as it is
+        (20_000.0, 2_048, 1_024),  # four times as many steps as are enough
+        (1e6, 2_048, 2_048),  # the preset's points at most
+        (5.0, 200, 200),
+    ],
+)
+def test_a_time_budget_chooses_the_points_of_a_step(
+    monkeypatch: pytest.MonkeyPatch, budget: float, most: int, expected: int
+) -> None:
+    clock = iter(range(1000))
+    monkeypatch.setattr(trainer.time, "perf_counter", lambda: float(next(clock)))  # 1 s a step
+    monkeypatch.setattr(Trainer, "_step", lambda _: {"total": 1.0})
+    preset = replace(TINY, subset=most, iterations=10**6)
+    of = Trainer(sphere(), preset, seed=0, device="cpu", time_budget=budget)
+    seen = [of.subset for _ in zip(range(9), of.run(), strict=False)]
+    assert of.subset == pytest.approx(expected, abs=2)
+    assert seen[:3] == [min(256, most)] * 3
+
+
+def test_later_steps_take_all_points_or_a_denser_lattice_under_a_time_budget(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Against the cloud alone: the other terms keep the points of a step."""
+    held = []
+    wrap_loss = losses.wrap_loss
+
+    def watched(made: torch.Tensor, given: torch.Tensor) -> torch.Tensor:
+        held.append((len(made), len(given)))
+        return wrap_loss(made, given)
+
+    monkeypatch.setattr(losses, "wrap_loss", watched)
+
+    def sizes(all_from: float, budget: float | None) -> tuple[int, int]:
+        preset = replace(TINY, all_from=all_from, warm_up=0.0)
+        of = Trainer(sphere(2_000), preset, seed=0, device="cpu", time_budget=budget)
+        points, grid = of._batch()
+        terms = of.terms(points, grid, of.shape.points)
+        assert all(value.isfinite() for value in terms.values())
+        return points.shape[1], len(grid)
+
+    assert sizes(0.0, None) == (2_000, 45**2)
+    assert sizes(0.0, 10.0) == (100, 100)
+    assert sizes(1.0, 10.0) == (100, 100)
+    assert held == [(45**2, 2_000), (400, 2_000), (100, 2_000)]
+
+
+def test_a_run_without_a_time_budget_takes_the_preset_s_points() -> None:
+    of = tiny(subset=120)
+    next(of.run())
+    assert of.subset == 120
+    assert 0 < of.processor_seconds < 10
 
 
 def test_the_same_seed_gives_the_same_weights_and_leaves_torch_s_generator_alone() -> None:
