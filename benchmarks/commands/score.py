@@ -15,7 +15,7 @@ from rich.text import Text
 from benchmarks.metrics import table as metrics
 from benchmarks.metrics.table import GROUPS, METRICS, WITHOUT_SPANNING, MapState
 from parapoint.errors import InputError
-from parapoint.files.surfaces import faults_of, read_parameterized
+from parapoint.files.reading import faults_of, read_parameterized
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, PointCloud
 

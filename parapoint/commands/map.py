@@ -7,7 +7,7 @@ import json
 import click
 
 from parapoint.commands.output import target, write
-from parapoint.files.surfaces import read_surface
+from parapoint.files.reading import read_surface
 
 
 @click.command("map")

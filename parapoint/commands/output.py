@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from parapoint.errors import InputError
 from parapoint.estimator import Estimator
+from parapoint.files.mesh_writers import write_obj
 from parapoint.files.point_writers import write_points
-from parapoint.files.surfaces import write_obj
 from parapoint.files.targets import checked_target
 from parapoint.surfaces.sampling import mean_spacing
 from parapoint.surfaces.spanning import Transform, opened, spanning_edges

@@ -9,7 +9,7 @@ import click
 
 from parapoint.commands.fitting import estimator_of, fitted, summary
 from parapoint.commands.output import target, write
-from parapoint.files.surfaces import read_surface
+from parapoint.files.reading import read_surface
 from parapoint.surfaces.components import components
 from parapoint.textures.checkerboard import checkerboard
 

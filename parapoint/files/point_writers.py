@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from parapoint.errors import InputError
-from parapoint.files.mesh_formats import COLOUR_COLUMNS
+from parapoint.files.attributes import COLOUR_COLUMNS
 from parapoint.files.targets import complete_file
 from parapoint.surfaces.surface import FloatArray, PointCloud, read_only
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from parapoint import InputError, Mesh, ParaPoint, cli
-from parapoint.files import surfaces as files
+from parapoint.files import reading as files
 from parapoint.surfaces.spanning import MOST_PIECES, opened, spanning_edges
 from parapoint.testing import irregular_disk
 from parapoint.textures.checkerboard import checkerboard

@@ -12,7 +12,7 @@ from benchmarks.__main__ import main
 from benchmarks.commands.score import json_values, map_state, number, same_faces, worst_faces
 from benchmarks.metrics.table import METRICS, MapState, evaluate
 from parapoint import Mesh, console
-from parapoint.files.surfaces import read_parameterized
+from parapoint.files.reading import read_parameterized
 
 # Two quads side by side; the second is drawn twice as long, in a chart of its own.
 OBJ = """v 0 0 0

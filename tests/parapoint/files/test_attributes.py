@@ -8,7 +8,7 @@ import pytest
 
 from parapoint import InputError, PointCloud
 from parapoint.files.point_writers import write_points
-from parapoint.files.surfaces import read_surface
+from parapoint.files.reading import read_surface
 
 POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 RGB = np.array([[255, 0, 0], [0, 128, 0], [1, 2, 3], [9, 8, 7]], dtype=np.uint8)

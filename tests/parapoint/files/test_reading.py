@@ -15,13 +15,9 @@ from numpy.testing import assert_array_equal
 
 from parapoint import InputError, Mesh, Parameterization, PointCloud
 from parapoint.files import point_writers
+from parapoint.files.mesh_writers import write_obj
 from parapoint.files.point_writers import write_points
-from parapoint.files.surfaces import (
-    FORMATS,
-    read_parameterized,
-    read_surface,
-    write_obj,
-)
+from parapoint.files.reading import FORMATS, read_parameterized, read_surface
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
 TRIANGLES = [[0, 1, 2], [0, 2, 3]]

@@ -1,25 +1,31 @@
-"""Surfaces and maps from files and to files.
+"""Surfaces and maps from files.
 
-Vertices and faces keep the order of the file (STL and glTF, which repeat vertices, are welded;
-see `parapoint.files.mesh_formats`). Every fault of a file is one InputError that names it.
+Vertices and faces keep the order of the file (STL and glTF, which repeat vertices, are welded).
+Every fault of a file is one InputError that names it: each reader of bytes may raise InputError,
+ValueError, IndexError, KeyError, OverflowError, struct.error or TypeError on bytes that are no
+such file.
 """
 
 from __future__ import annotations
 
 import logging
-import struct
-import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from parapoint.errors import InputError
-from parapoint.files import mesh_formats, point_formats
-from parapoint.files.mesh_formats import NO_UV, Content
-from parapoint.files.targets import beside, complete_file, sealed_png, sealed_text
+from parapoint.files.content import NO_UV, Content
+from parapoint.files.gltf import glb, gltf
+from parapoint.files.las import las
+from parapoint.files.obj import obj
+from parapoint.files.off import off
+from parapoint.files.pcd import pcd
+from parapoint.files.ply import ply
+from parapoint.files.polygons import triangle_rows
+from parapoint.files.stl import stl
+from parapoint.files.xyz import pts, xyz
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import (
     BoolArray,
@@ -32,17 +38,17 @@ from parapoint.surfaces.surface import (
 )
 
 FORMATS: dict[str, Callable[[bytes, Path], Content]] = {
-    ".obj": lambda data, _: mesh_formats.obj(data),
-    ".ply": lambda data, _: mesh_formats.ply(data),
-    ".off": lambda data, _: mesh_formats.off(data),
-    ".stl": lambda data, _: mesh_formats.stl(data),
-    ".glb": mesh_formats.glb,
-    ".gltf": mesh_formats.gltf,
-    ".xyz": lambda data, _: point_formats.xyz(data),
-    ".pts": lambda data, _: point_formats.pts(data),
-    ".pcd": lambda data, _: point_formats.pcd(data),
-    ".las": lambda data, _: point_formats.las(data),
-    ".laz": lambda data, _: point_formats.las(data),
+    ".obj": lambda data, _: obj(data),
+    ".ply": lambda data, _: ply(data),
+    ".off": lambda data, _: off(data),
+    ".stl": lambda data, _: stl(data),
+    ".glb": glb,
+    ".gltf": gltf,
+    ".xyz": lambda data, _: xyz(data),
+    ".pts": lambda data, _: pts(data),
+    ".pcd": lambda data, _: pcd(data),
+    ".las": lambda data, _: las(data),
+    ".laz": lambda data, _: las(data),
 }
 """Reader of each file name ending; it gets the bytes and the folder of the file."""
 
@@ -160,33 +166,6 @@ def _mesh(content: Content) -> tuple[Mesh, IntArray]:
     return Mesh(vertices, content.corners[rows]), rows
 
 
-def triangle_rows(vertices: FloatArray, sizes: IntArray, corners: IntArray) -> IntArray:
-    """(F, 3) places in `corners` of the triangles of polygons, polygon by polygon.
-
-    A polygon of n corners gives n - 2 triangles, a fan from its first corner; a quad that would
-    fold along that diagonal (the two triangles face away from each other) is fanned from its
-    second corner, which is right for every planar quad.
-
-    Args:
-        vertices: (V, 3) positions, finite.
-        sizes: (N,) corners of each polygon, at least 3.
-        corners: (sum of sizes,) rows of `vertices`.
-    """
-    starts = np.cumsum(sizes) - sizes
-    turn = np.zeros(len(sizes), dtype=np.int64)
-    quads = np.flatnonzero(sizes == 4)
-    if len(quads):
-        scale = float(np.abs(vertices).max()) or 1.0  # products of huge coordinates overflow
-        a, b, c, d = (vertices[corners[starts[quads] + k]] / scale for k in range(4))
-        first, second = np.cross(b - a, c - a), np.cross(c - a, d - a)
-        turn[quads] = (first * second).sum(axis=1) < 0
-    count = sizes - 2
-    step = mesh_formats.ranges(np.ones_like(count), count)
-    place = np.stack([np.zeros_like(step), step, step + 1], axis=1)
-    start, shift, size = (np.repeat(values, count)[:, None] for values in (starts, turn, sizes))
-    return np.asarray(start + (place + shift) % size)
-
-
 def _shared_corners(mesh: Mesh, uv: FloatArray, corners: IntArray) -> IntArray:
     """`corners` with the first of all rows that hold the same UV for the same vertex."""
     flat = corners.reshape(-1)
@@ -236,77 +215,3 @@ def _point_cloud(content: Content, path: Path) -> PointCloud:
         normals = None
     attributes = {name: values[finite] for name, values in content.attributes.items()}
     return PointCloud(content.vertices[finite], normals, int((~finite).sum()), attributes)
-
-
-def write_obj(
-    path: str | Path,
-    mesh: Mesh,
-    parameterization: Parameterization,
-    texture: npt.NDArray[np.uint8] | None = None,
-) -> None:
-    """Write a mesh and its map as OBJ: v, vt and f with both indices, exact to the last bit.
-
-    Args:
-        path: the OBJ file; it appears only when it is complete.
-        mesh: the mesh.
-        parameterization: its map.
-        texture: (H, W, 3) pixels, first row at the top. With it, a material beside the OBJ
-            (same name, .mtl) shows it (same name, .png).
-
-    Raises:
-        InputError: the map has another number of faces than the mesh, or the texture another shape.
-        OSError: a file cannot be written; nothing of the OBJ is left behind.
-    """
-    path = Path(path)
-    if len(mesh.faces) != len(parameterization.corners):
-        raise InputError(
-            f"{path}: a map of {len(parameterization.corners)} faces cannot be written "
-            f"with a mesh of {len(mesh.faces)}"
-        )
-    material = ""
-    if texture is not None:
-        image, library = beside(path, ".png"), beside(path, ".mtl")
-        pixels = sealed_png(png(texture))
-        with complete_file(image) as file:
-            file.write(pixels)
-        with complete_file(library) as file:
-            file.write(sealed_text(f"newmtl map\nKd 1 1 1\nmap_Kd {image.name}\n"))
-        material = f"mtllib {library.name}\nusemtl map\n"
-    corners = np.stack([mesh.faces, parameterization.corners], axis=2).reshape(-1, 6) + 1
-    lines = [
-        material,
-        *(f"v {x!r} {y!r} {z!r}\n" for x, y, z in mesh.vertices.tolist()),
-        *(f"vt {u!r} {v!r}\n" for u, v in parameterization.uv.tolist()),
-        *(f"f {a}/{ta} {b}/{tb} {c}/{tc}\n" for a, ta, b, tb, c, tc in corners.tolist()),
-    ]
-    with complete_file(path) as file:
-        file.write("".join(lines).encode())
-
-
-def png(pixels: npt.NDArray[np.uint8]) -> bytes:
-    """A PNG file of (H, W, 3) uint8 pixels.
-
-    Raises:
-        InputError: another shape or type.
-    """
-    if pixels.ndim != 3 or pixels.shape[2] != 3 or pixels.dtype != np.uint8 or pixels.size == 0:
-        raise InputError(
-            f"a texture must be (H, W, 3) uint8 pixels, not {pixels.shape} {pixels.dtype}"
-        )
-    height, width, _ = pixels.shape
-    rows = np.zeros((height, 1 + 3 * width), dtype=np.uint8)  # each row begins with filter 0
-    rows[:, 1:] = pixels.reshape(height, -1)
-
-    def chunk(kind: bytes, body: bytes) -> bytes:
-        crc = zlib.crc32(kind + body)
-        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", crc)
-
-    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)  # 8 bits of red, green, blue
-    return b"".join(
-        [
-            b"\x89PNG\r\n\x1a\n",
-            chunk(b"IHDR", header),
-            chunk(b"IDAT", zlib.compress(rows.tobytes())),
-            chunk(b"IEND", b""),
-        ]
-    )

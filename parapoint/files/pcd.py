@@ -1,13 +1,11 @@
-"""Readers of point-cloud files: XYZ, PTS, PCD and LAS; bytes in, `Content` without faces out.
+"""PCD of the Point Cloud Library: bytes in, `Content` without faces out.
 
-The PCD reader is our own: the packages that read the format bring a validation framework and a
-compiled LZF module for what is a header and a table. See `parapoint.files.mesh_formats` for what is
-raised on bytes that are no such file.
+Ours: the packages that read the format bring a validation framework and a compiled LZF module for
+what is a header and a table.
 """
 
 from __future__ import annotations
 
-import io
 import struct
 from typing import Any
 
@@ -15,105 +13,13 @@ import numpy as np
 import numpy.typing as npt
 
 from parapoint.errors import InputError
-from parapoint.files.mesh_formats import Content, colours_of, named_attributes, points_content
-from parapoint.surfaces.surface import FloatArray
+from parapoint.files.attributes import named_attributes
+from parapoint.files.content import Content, points_content
+from parapoint.files.xyz import table, text_lines
 
-
-def table(lines: list[bytes], columns: tuple[int, ...]) -> FloatArray:
-    """(n, len(columns)) numbers in these columns of text lines; empty for no lines."""
-    if not lines:
-        return np.zeros((0, len(columns)))
-    text = (line.decode("latin-1") for line in lines)  # no second copy of millions of lines
-    return np.loadtxt(text, comments="#", usecols=columns, ndmin=2, dtype=np.float64)
-
-
-def text_lines(data: bytes) -> list[bytes]:
-    """Lines that hold more than blanks and comments, commas turned into blanks."""
-    return [
-        line
-        for line in data.replace(b",", b" ").splitlines()
-        if line.strip() and not line.lstrip().startswith((b"#", b"//"))
-    ]
-
-
-def xyz(data: bytes) -> Content:
-    """Text with x y z in each line, and whatever columns a scanner adds; see `_further_columns`."""
-    lines = text_lines(data)
-    if lines and len(lines[0].split()) == 1:
-        lines = lines[1:]  # a count on its own, as scanners write it
-    if not lines:
-        raise InputError("has no point")
-    try:
-        values = table(lines, tuple(range(len(lines[0].split()))))
-    except ValueError:  # words, or not in all lines: the coordinates alone
-        values = table(lines, (0, 1, 2))
-    if values.shape[1] < 3:
-        raise InputError("has fewer than three numbers in a line")
-    return points_content(values[:, :3], *_further_columns(values))
-
-
-def _further_columns(
-    values: FloatArray,
-) -> tuple[FloatArray | None, dict[str, npt.NDArray[Any]]]:
-    """Normals, or None, and attributes in the columns behind x y z of (P, 3 + k) numbers.
-
-    Three columns together are normals where all have length 1, and colours where all are whole
-    numbers from 0 to 255 or fractions from 0 to 1. Single columns come before them, as in PTS: the
-    first is the intensity.
-    """
-    finite = np.isfinite(values).all(axis=1)
-    normals: FloatArray | None = None
-    attributes: dict[str, npt.NDArray[Any]] = {}
-    columns = values.shape[1]
-    single = (columns - 3) % 3
-    for at in range(3, 3 + single):
-        attributes["intensity" if at == 3 else f"column{at + 1}"] = values[:, at]
-    for at in range(3 + single, columns, 3):
-        three = values[:, at : at + 3]
-        length = np.linalg.norm(np.clip(three[finite], -2, 2), axis=1)  # clipped: no overflow
-        colours = colours_of(three)
-        if normals is None and len(length) and (np.abs(length - 1) < 1e-3).all():
-            normals = three
-        elif "colours" not in attributes and colours is not None and colours.dtype != np.uint16:
-            attributes["colours"] = colours
-        else:
-            attributes |= {f"column{at + k + 1}": three[:, k] for k in range(3)}
-    return normals, attributes
-
-
-def pts(data: bytes) -> Content:
-    """PTS: lines "p x y z" (Hoppe), or a count and then x y z and what a scanner adds."""
-    lines = text_lines(data)
-    marked = [line for line in lines if line.startswith(b"p ")]
-    return points_content(table(marked, (1, 2, 3))) if marked else xyz(data)
-
-
-def las(data: bytes) -> Content:
-    """LAS, and LAZ where laspy has a decoder: scaled coordinates of all points."""
-    import laspy
-
-    if data[:4] != b"LASF":
-        raise InputError("has no LAS header")
-    if data[24:25] != b"\x01":  # laspy goes by the minor version alone
-        raise InputError(f"is of LAS version {data[24]}.{data[25]}; 1.0 to 1.4 are read")
-    # laspy makes room for whatever the header announces, be it four thousand million points.
-    start, records, kind, width, points = struct.unpack_from("<IIBHI", data, 96)
-    extended = 0
-    if data[24:26] >= b"\x01\x04":
-        extended, points = struct.unpack_from("<IQ", data, 243)
-    compressed = kind >= 128
-    if not compressed and start + width * points > len(data):
-        raise InputError(f"ends early: {points} points are announced")
-    if 54 * records + 60 * extended > len(data):
-        raise InputError(f"ends early: {records + extended} variable records are announced")
-    read = laspy.read(io.BytesIO(data))
-    names = [name for name in read.point_format.dimension_names if name not in "XYZ"]
-    columns = {name: np.asarray(read[name]) for name in names}
-    if all(name in columns and not columns[name].any() for name in ("red", "green", "blue")):
-        for name in ("red", "green", "blue"):  # room for colours that were never taken
-            del columns[name]
-    points = np.asarray(read.xyz, dtype=np.float64)
-    return points_content(points, attributes=named_attributes(columns))
+PACKED = {"rgb": 3, "rgba": 4}
+"""Fields that hold the bytes blue, green, red (and alpha) of a colour, and how many count."""
+PCD_NORMALS = ("normal_x", "normal_y", "normal_z")
 
 
 def pcd(data: bytes) -> Content:
@@ -156,11 +62,6 @@ def pcd(data: bytes) -> Content:
     if set(PCD_NORMALS) <= set(columns):
         normals = np.stack([columns.pop(name) for name in PCD_NORMALS], axis=1).astype(np.float64)
     return points_content(points, normals, _pcd_attributes(columns))
-
-
-PACKED = {"rgb": 3, "rgba": 4}
-"""Fields that hold the bytes blue, green, red (and alpha) of a colour, and how many count."""
-PCD_NORMALS = ("normal_x", "normal_y", "normal_z")
 
 
 def _pcd_attributes(columns: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
