@@ -41,7 +41,7 @@ def test_the_trainer_has_its_loss_and_its_gradients() -> None:
     trainer.networks.double()
     with torch.no_grad():  # as they are drawn, tangents are a thousandth and hide two terms
         for parameter in trainer.networks.parameters():
-            parameter *= 2.5
+            parameter.mul_(2.5)
     rows, grid = (batch.double() for batch in trainer._batch())
     terms = trainer.terms(rows, grid, rows[0])
     total = torch.stack([trainer.weights[name] * value for name, value in terms.items()]).sum()
