@@ -63,8 +63,36 @@ class FlatMap(NamedTuple):
     facts: dict[str, Any]
 
 
-def flat_map(points: FloatArray, deadline: float = math.inf) -> FlatMap:
-    """A nearly conformal map of distinct points (N, 3), less so where `deadline` ends the descents.
+class Flattened(NamedTuple):
+    """A cloud as a triangle mesh, cut open and laid into the plane.
+
+    Attributes:
+        rows: (A,) rows of the cloud that the triangulation reached.
+        mesh: the triangulation of these A points.
+        disk: the mesh cut to a planar domain of M vertices.
+        origin: (M,) the vertex of `mesh` that each one of `disk` is or copies.
+        uv: (M, 2) images of the vertices of `disk`; the map is bijective and keeps the total area.
+        is_denoised: whether `mesh` is of the denoised points.
+    """
+
+    rows: IntArray
+    mesh: Mesh
+    disk: Mesh
+    origin: IntArray
+    uv: FloatArray
+    is_denoised: bool
+
+    def jacobians(self) -> FloatArray:
+        """(M, 2, 3) d uv / d x at the vertices of `disk`."""
+        return _vertex_jacobians(self.disk, self.uv)
+
+    def chosen(self) -> IntArray:
+        """(A,) the one vertex of `disk` that stands for each of `mesh`."""
+        return _chosen_copies(self.disk, self.origin)
+
+
+def flattened(points: FloatArray, deadline: float = math.inf) -> Flattened:
+    """Distinct points (N, 3) triangulated, cut and flattened; see `flat_map`.
 
     Raises:
         ReconstructionError: the points show no surface that can be followed and flattened.
@@ -85,18 +113,28 @@ def flat_map(points: FloatArray, deadline: float = math.inf) -> FlatMap:
         raise ReconstructionError(f"the triangulation has no flat map ({error})") from None
     uv -= (uv.max(axis=0) + uv.min(axis=0)) / 2
     uv *= np.sqrt(disk.face_areas.sum() / signed_areas(uv, disk.faces).sum())
-    chosen = _chosen_copies(disk, _origin(mesh, disk))
-    jacobians = _vertex_jacobians(disk, uv)[chosen]
-    boundary = [int((of.edge_face_count == 1).sum()) for of in (mesh, disk)]
+    return Flattened(reached, mesh, disk, _origin(mesh, disk), uv, is_denoised)
+
+
+def flat_map(points: FloatArray, deadline: float = math.inf) -> FlatMap:
+    """A nearly conformal map of distinct points (N, 3), less so where `deadline` ends the descents.
+
+    Raises:
+        ReconstructionError: the points show no surface that can be followed and flattened.
+    """
+    flat = flattened(points, deadline)
+    chosen = flat.chosen()
+    jacobians = flat.jacobians()[chosen]
+    boundary = [int((of.edge_face_count == 1).sum()) for of in (flat.mesh, flat.disk)]
     facts = {
-        "genus": mesh.genus,
-        "boundary_loops": len(mesh.boundary_loops),
-        "faces": len(mesh.faces),
+        "genus": flat.mesh.genus,
+        "boundary_loops": len(flat.mesh.boundary_loops),
+        "faces": len(flat.mesh.faces),
         "seam_edges": (boundary[1] - boundary[0]) // 2,
-        "denoised": is_denoised,
+        "denoised": flat.is_denoised,
     }
     inverse: FloatArray = np.asarray(np.linalg.pinv(jacobians, rcond=0.1), dtype=np.float64)
-    return FlatMap(reached, uv[chosen], jacobians, inverse, facts)
+    return FlatMap(flat.rows, flat.uv[chosen], jacobians, inverse, facts)
 
 
 def _still(points: FloatArray) -> tuple[Mesh, bool]:
