@@ -18,7 +18,7 @@ from parapoint.estimator import Estimator
 from parapoint.fitting import Fitted, Progress, Session
 from parapoint.parameters import check_whole
 from parapoint.surfaces.frame import Frame
-from parapoint.surfaces.sampling import FEWEST_POINTS, training_points
+from parapoint.surfaces.sampling import FEWEST_POINTS, training_points, without_coincident
 from parapoint.surfaces.surface import FloatArray, PointCloud, Surface, vertex_normals
 
 logger = logging.getLogger("parapoint")
@@ -31,8 +31,6 @@ PLANNED = 0.55
 models three times as many points took 0.8 to 1.6 times as long each."""
 DESCENDING = 0.8
 """Share of the time budget after which a map is improved no more."""
-COINCIDENT = 1e-6
-"""Points that agree to this, in radii of the surface, count as one."""
 
 
 @dataclass
@@ -146,9 +144,7 @@ def _computed(surface: Surface, count: int, seed: int, deadline: float) -> _Draw
     """The map of at most `count` points of a surface."""
     points = training_points(surface, count, seed)
     frame = Frame.of(points)
-    cloud = frame.inside(points)
-    _, rows = np.unique(np.round(cloud / COINCIDENT), axis=0, return_index=True)
-    cloud = cloud[np.sort(rows)]
+    cloud = without_coincident(frame.inside(points))
     return _Drawn(points, frame, cloud, flat_map(cloud, deadline))
 
 
