@@ -19,7 +19,13 @@ from parapoint.errors import InputError
 from parapoint.fitting import COMPONENTS, Fitted, Progress, Session, SurfaceMap
 from parapoint.parameters import check_choice, check_number, check_whole
 from parapoint.surfaces.frame import Frame
-from parapoint.surfaces.parameterization import Parameterization, PointParameterization, TracePoint
+from parapoint.surfaces.gridding import gridded
+from parapoint.surfaces.parameterization import (
+    Charted,
+    Parameterization,
+    PointParameterization,
+    TracePoint,
+)
 from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, PointCloud, Surface
 
 logger = logging.getLogger("parapoint")
@@ -187,6 +193,20 @@ class Estimator(ABC):
             InputError: the coordinates have another shape or are not finite, or nothing is fitted.
         """
         return self._known().lift(coordinates(uv, 2))
+
+    def mesh(self) -> Charted:
+        """The surface that the map describes, as a mesh with a map, both in the points' unit.
+
+        The triangulation that the map was computed on, where it was; otherwise a grid in the plane,
+        carried to the surface by `inverse_transform` (`parapoint.surfaces.gridding`).
+
+        Raises:
+            InputError: nothing is fitted.
+        """
+        fitted = self._known()
+        if (held := fitted.charted()) is not None:
+            return held
+        return gridded(fitted.flatten(fitted.points), fitted.lift)
 
     def seams(self, points: npt.ArrayLike | Surface | None = None) -> BoolArray:
         """(N,) whether each point lies on a cutting seam (paper, eq. "find-cut").

@@ -41,6 +41,13 @@ The energy of a map is the area-weighted mean; for `exp_conformal` the logarithm
 exp(density), which would overflow at a far start.
 """
 
+NUDGE = 1e-5
+"""Corners move so far for a difference quotient of the energy, in typical edges."""
+HALVINGS = 40
+"""Steps down the slope that are tried: the extent of the map, halved so many times."""
+ROUNDING = 1e-9
+"""Relative fall of an energy that counts as none."""
+
 
 @dataclass(frozen=True)
 class SLIM:
@@ -117,9 +124,8 @@ class SLIM:
             seconds = perf_counter() - began
             trace.append(TracePoint(step, seconds, {self.energy: energy(uv)}, kept))
         first, last = trace[0].values[self.energy], trace[-1].values[self.energy]
-        least = DENSITIES[self.energy][1]
-        # A start that is the minimum cannot fall (a flat regular polygon).
-        if not (last < first or first <= least + 1e-9):
+        # A start that is the minimum cannot fall (a regular polygon, flat or drawn up to a cone).
+        if not (last < first or is_minimum(self.energy, weight, frame, start, disk.faces)):
             raise FlatteningError(
                 f"SLIM's {self.energy} energy did not fall in {self.iterations} iterations: "
                 f"{first:.6g} at the start, {last:.6g} at the end"
@@ -164,6 +170,50 @@ def stepper(
         weight,
     )
     return lambda steps: np.ascontiguousarray(igl.slim_solve(state, steps) / scale)
+
+
+def is_minimum(
+    name: str, weight: FloatArray, frame: FloatArray, uv: FloatArray, faces: IntArray
+) -> bool:
+    """Whether no step down its slope lowers the energy of a map by more than rounding does.
+
+    Args:
+        name: key of DENSITIES.
+        weight: (F,) share of each triangle in the 3D area.
+        frame: (F, 2, 2) the triangles in 3D, as `baselines.disks.flattening.frames` gives them.
+        uv: (V, 2) the map.
+        faces: (F, 3) rows of `uv`.
+    """
+    here = map_energy(name, weight, *singular_values(frame, uv, faces))
+    if not np.isfinite(here):
+        return False
+    corners = uv[faces]
+    apart = np.arange(faces.size).reshape(-1, 3)
+
+    def densities(moved: FloatArray) -> FloatArray:
+        return DENSITIES[name][0](*singular_values(frame, moved.reshape(-1, 2), apart))
+
+    share = weight
+    if name == "exp_conformal":
+        density = densities(corners)
+        share = weight * np.exp(density - density.max())
+        share = share / share.sum()
+    nudge = NUDGE * float(np.ptp(uv, axis=0).max()) / len(faces) ** 0.5
+    slope = np.zeros_like(uv)
+    for corner, axis in np.ndindex(3, 2):
+        shift = np.zeros((3, 2))
+        shift[corner, axis] = nudge
+        rise = share * (densities(corners + shift) - densities(corners - shift)) / (2 * nudge)
+        slope[:, axis] += np.bincount(faces[:, corner], rise, len(uv))
+    steepest = float(np.linalg.norm(slope, axis=1).max())
+    if steepest == 0:
+        return True
+    down = -slope / steepest * float(np.ptp(uv, axis=0).max())
+    there = [
+        map_energy(name, weight, *singular_values(frame, uv + 2.0**-halving * down, faces))
+        for halving in range(HALVINGS)
+    ]
+    return min(there) > here - ROUNDING * max(1.0, here)
 
 
 def map_energy(name: str, weight: FloatArray, s1: FloatArray, s2: FloatArray) -> float:

@@ -66,7 +66,7 @@ class NeuralMethod:
     Attributes:
         points: training points, drawn as for ParaPoint.
         iterations: steps.
-        subset: points of a step.
+        subset: points of a step, at most; see `Trainer` on time budgets.
         time_budget: seconds of training at most; the schedule follows the time where that ends
             sooner.
     """
@@ -134,7 +134,7 @@ class NeuralMethod:
                 trace.append(TracePoint(step.iteration, step.seconds, step.losses, map_now))
         report: dict[str, object] = {
             "points": len(cloud),
-            "points_of_a_step": min(self.subset, len(cloud)),
+            "points_of_a_step": min(trainer.subset, len(cloud)),
             "iterations": trainer.iteration,
             "weights": trainer.weights,
             "losses": dict(trace[-1].values),

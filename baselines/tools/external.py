@@ -14,7 +14,7 @@ import numpy as np
 
 from baselines.disks.flattening import FlatteningError
 from parapoint.errors import InputError
-from parapoint.files.surfaces import read_parameterized
+from parapoint.files.reading import read_parameterized
 from parapoint.method import MissingError, UnsupportedError
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh, Surface

@@ -28,7 +28,7 @@ import pooch
 
 from benchmarks.cases.builtin import BUILTIN, sampled
 from parapoint.errors import InputError
-from parapoint.files.surfaces import FORMATS, read_surface
+from parapoint.files.reading import FORMATS, read_surface
 from parapoint.surfaces.surface import Mesh, PointCloud, Surface
 
 MIRROR = "PARAPOINT_DATA"

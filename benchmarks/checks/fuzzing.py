@@ -27,7 +27,7 @@ import numpy as np
 
 from parapoint import console
 from parapoint.errors import InputError
-from parapoint.files.surfaces import FORMATS, UV_FORMATS
+from parapoint.files.reading import FORMATS, UV_FORMATS
 
 LONGEST = 4096
 """Bytes of an input, at most."""
@@ -46,7 +46,7 @@ class Finding(Exception):  # noqa: N818  not an error of this program
 
 def read_as(ending: str, data: bytes) -> None:
     """Read `data` as a file of that ending: its surface, and its map where it may carry one."""
-    from parapoint.files.surfaces import read_parameterized, read_surface
+    from parapoint.files.reading import read_parameterized, read_surface
 
     path = _scratch() / f"input{ending}"
     path.write_bytes(data)

@@ -110,13 +110,34 @@ def straightforward_maps(
         seed: of torch's generator.
     """
     import torch
+
+    from parapoint.learned.optimizers import AdamW
+
+    torch.manual_seed(seed)
+    networks = straightforward_networks()
+    rate, decay = AdamW.learning_rate, AdamW.weight_decay
+    optimizer = torch.optim.AdamW(networks.parameters(), rate, weight_decay=decay)
+    P, watched = torch.as_tensor(points).float(), torch.as_tensor(at).float()
+    side = torch.linspace(-1, 1, round(math.sqrt(len(P))))
+    grid = torch.cartesian_prod(side, side)
+    seconds = 0.0
+    while True:
+        begin = time.process_time()
+        loss = straightforward_loss(networks, P, grid)
+        optimizer.zero_grad()
+        loss.backward()  # type: ignore[no-untyped-call]
+        optimizer.step()
+        seconds += time.process_time() - begin
+        with torch.no_grad():
+            uv = networks["unwrap"](_moved(networks, "cut", watched))
+        yield seconds, np.asarray(uv, dtype=np.float64)
+
+
+def straightforward_networks() -> nn.ModuleDict:
+    """The stacks of the five networks; Deform and Cut have two each, "embed" and "move"."""
     from torch import nn
 
     from parapoint.learned.presets import PAPER
-
-    def nearest(queries: Tensor, among: Tensor, count: int) -> Tensor:
-        index: Tensor = torch.cdist(queries, among).topk(count, largest=False).indices
-        return index
 
     def phi(inputs: int, outputs: int) -> nn.Sequential:
         layers: list[nn.Module] = []
@@ -124,68 +145,98 @@ def straightforward_maps(
             layers += [nn.Linear(before, after), nn.LeakyReLU(0.01)]
         return nn.Sequential(*layers[:-1])
 
-    def offset(embed: nn.Module, move: nn.Module, x: Tensor) -> Tensor:
-        moved: Tensor = move(torch.cat([embed(x), x], dim=1))
-        return x + moved
-
-    def jacobian(values: Tensor, uv: Tensor) -> Tensor:
-        rows = [torch.autograd.grad(values[:, c].sum(), uv, create_graph=True)[0] for c in range(3)]
-        return torch.stack(rows, dim=1)
-
-    def distortion(J: Tensor) -> Tensor:
-        E, G = J.square().sum(1).unbind(1)
-        F = J.prod(2).sum(1)
-        root = ((E - G).square() + 4 * F.square() + 1e-12).sqrt()
-        larger, smaller = (E + G + root) / 2, (E + G - root).clamp(min=1e-12) / 2
-        return (larger.sqrt() - smaller.sqrt()).abs().mean()
-
-    def anti_flip(J: Tensor, made: Tensor) -> Tensor:
-        normals = nn.functional.normalize(torch.linalg.cross(J[:, :, 0], J[:, :, 1]), dim=1)
-        near = normals[nearest(made.detach(), made.detach(), PAPER.anti_flip_neighbours + 1)[:, 1:]]
-        return (-(normals[:, None] * near).sum(2)).clamp(min=0).sum(1).mean()
-
-    torch.manual_seed(seed)
     d = PAPER.embedding
-    embed2, move2, embed3, move3 = phi(2, d), phi(d + 2, 2), phi(3, d), phi(d + 3, 3)
-    unwrap, wrap, stitch = phi(3, 2), phi(2, 3), phi(3, 3)
-    parameters = [
-        p for net in (embed2, move2, embed3, move3, unwrap, wrap, stitch) for p in net.parameters()
-    ]
-    optimizer = torch.optim.AdamW(parameters, PAPER.learning_rate, weight_decay=PAPER.weight_decay)
-    P, watched = torch.as_tensor(points).float(), torch.as_tensor(at).float()
-    side = torch.linspace(-1, 1, round(math.sqrt(len(P))))
-    grid = torch.cartesian_prod(side, side)
-    seconds = 0.0
-    while True:
-        begin = time.process_time()
-        S = offset(embed3, move3, P)
-        Q = unwrap(S)
-        S_cycle = wrap(Q)
-        P_cycle = stitch(S_cycle)
-        Q_hat = offset(embed2, move2, grid)
-        S_hat = wrap(Q_hat)
-        P_hat = stitch(S_hat)
-        S_hat_cycle = offset(embed3, move3, P_hat)
-        Q_hat_cycle = unwrap(S_hat_cycle)
-        J_f, J_g = jacobian(P_cycle, Q), jacobian(P_hat, Q_hat)
-        spacing = PAPER.unwrap_spacing * (Q.amax(0) - Q.amin(0)).max().detach() / math.sqrt(len(Q))
-        near = Q[nearest(Q.detach(), Q.detach(), PAPER.unwrap_neighbours + 1)[:, 1:]]
-        repulsion = (spacing - (Q[:, None] - near).norm(dim=2)).clamp(min=0).sum(1).mean()
-        apart = torch.cdist(P_hat, P)
-        chamfer = torch.maximum(apart.amin(0).mean(), apart.amin(1).mean())
-        pairs = ((P, P_cycle), (S, S_cycle), (Q_hat, Q_hat_cycle), (S_hat, S_hat_cycle))
-        cycle = torch.stack([(a - b).abs().sum(1).mean() for a, b in pairs]).sum()
-        loss = (
-            PAPER.wrap_weight * chamfer
-            + PAPER.unwrap_weight * repulsion
-            + PAPER.cycle_weight * cycle
-            + PAPER.distortion_weight * (distortion(J_f) + distortion(J_g))
-            + PAPER.anti_flip_weight * (anti_flip(J_f, P_cycle) + anti_flip(J_g, P_hat))
-        )
-        optimizer.zero_grad()
-        loss.backward()
-        optimizer.step()
-        seconds += time.process_time() - begin
-        with torch.no_grad():
-            uv = unwrap(offset(embed3, move3, watched))
-        yield seconds, np.asarray(uv, dtype=np.float64)
+    return nn.ModuleDict(
+        {
+            "deform_embed": phi(2, d),
+            "deform_move": phi(d + 2, 2),
+            "cut_embed": phi(3, d),
+            "cut_move": phi(d + 3, 3),
+            "unwrap": phi(3, 2),
+            "wrap": phi(2, 3),
+            "stitch": phi(3, 3),
+        }
+    )
+
+
+def _moved(networks: nn.ModuleDict, name: str, x: Tensor) -> Tensor:
+    """Deform or Cut of points."""
+    import torch
+
+    embedding = networks[f"{name}_embed"](x)
+    offset: Tensor = networks[f"{name}_move"](torch.cat([embedding, x], dim=1))
+    return x + offset
+
+
+def straightforward_loss(networks: nn.ModuleDict, P: Tensor, grid: Tensor) -> Tensor:
+    """The weighted objective at all points (N, 3) and a lattice (M, 2)."""
+    import torch
+
+    from parapoint.learned.presets import PAPER
+
+    unwrap, wrap, stitch = (networks[name] for name in ("unwrap", "wrap", "stitch"))
+    S = _moved(networks, "cut", P)
+    Q = unwrap(S)
+    S_cycle = wrap(Q)
+    P_cycle = stitch(S_cycle)
+    Q_hat = _moved(networks, "deform", grid)
+    S_hat = wrap(Q_hat)
+    P_hat = stitch(S_hat)
+    S_hat_cycle = _moved(networks, "cut", P_hat)
+    Q_hat_cycle = unwrap(S_hat_cycle)
+    J_f, J_g = _jacobian(P_cycle, Q), _jacobian(P_hat, Q_hat)
+    spacing = PAPER.unwrap_spacing * (Q.amax(0) - Q.amin(0)).max().detach() / math.sqrt(len(Q))
+    near = Q[_nearest(Q.detach(), PAPER.unwrap_neighbours)]
+    repulsion = (spacing - (Q[:, None] - near).norm(dim=2)).clamp(min=0).sum(1).mean()
+    apart = torch.cdist(P_hat, P)
+    chamfer = torch.maximum(apart.amin(0).mean(), apart.amin(1).mean())
+    pairs = ((P, P_cycle), (S, S_cycle), (Q_hat, Q_hat_cycle), (S_hat, S_hat_cycle))
+    cycle = torch.stack([(a - b).abs().sum(1).mean() for a, b in pairs]).sum()
+    total: Tensor = (
+        PAPER.wrap_weight * chamfer
+        + PAPER.unwrap_weight * repulsion
+        + PAPER.cycle_weight * cycle
+        + PAPER.distortion_weight * (_distortion(J_f) + _distortion(J_g))
+        + PAPER.anti_flip_weight * (_anti_flip(J_f, P_cycle) + _anti_flip(J_g, P_hat))
+    )
+    return total
+
+
+def _nearest(points: Tensor, count: int) -> Tensor:
+    """(N, count) rows of the nearest other points."""
+    import torch
+
+    index: Tensor = torch.cdist(points, points).topk(count + 1, largest=False).indices
+    return index[:, 1:]
+
+
+def _jacobian(values: Tensor, uv: Tensor) -> Tensor:
+    """(N, 3, 2), with a graph of its own."""
+    import torch
+
+    rows = [torch.autograd.grad(values[:, c].sum(), uv, create_graph=True)[0] for c in range(3)]
+    return torch.stack(rows, dim=1)
+
+
+def _distortion(J: Tensor) -> Tensor:
+    """Mean of |λ1 − λ2|."""
+    import torch
+
+    E, G = J.square().sum(1).unbind(1)
+    F = J.prod(2).sum(1)
+    least = 1e-12 * (E + G).detach()
+    root = ((E - G).square() + 4 * F.square() + least.square()).sqrt()
+    larger, smaller = (E + G + root) / 2, torch.maximum(E + G - root, least) / 2
+    return (larger.sqrt() - smaller.sqrt()).abs().mean()
+
+
+def _anti_flip(J: Tensor, made: Tensor) -> Tensor:
+    """Mean over the points of how far their neighbours' normals turn away, T = π/2."""
+    import torch
+
+    from parapoint.learned.presets import PAPER
+
+    crosses = torch.linalg.cross(J[:, :, 0], J[:, :, 1])
+    normals = torch.nn.functional.normalize(crosses, dim=1)
+    near = normals[_nearest(made.detach(), PAPER.anti_flip_neighbours)]
+    return (-(normals[:, None] * near).sum(2)).clamp(min=0).sum(1).mean()

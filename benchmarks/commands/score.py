@@ -16,7 +16,7 @@ from benchmarks.metrics import table as metrics
 from benchmarks.metrics.grades import BOUNDS, grade
 from benchmarks.metrics.table import GROUPS, METRICS, WITHOUT_SPANNING, MapState
 from parapoint.errors import InputError
-from parapoint.files.surfaces import faults_of, read_parameterized
+from parapoint.files.reading import faults_of, read_parameterized
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, PointCloud
 

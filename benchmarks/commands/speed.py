@@ -89,7 +89,7 @@ def training_rates() -> list[Rate]:
             trainer = Trainer(points[:count], numbers, seed=0, device="cpu")
             steps = trainer.run()
             assert isinstance(trainer.networks, SubNetworks)
-            there, back = products(trainer.networks, tangents=len(trainer.shape) - 1)
+            there, back = products(trainer.networks, tangents=len(trainer.shape.rows) - 1)
             lattice = round(count**0.5) ** 2
             operations = 3 * 2 * (there * count + back * lattice)  # the backward pass is two more
             layers = _products(numbers.hidden, 3 * (count + lattice), backward=True)  # as in Wrap

@@ -25,7 +25,7 @@ from benchmarks.running.cluster import WORKER_LOST
 from benchmarks.running.tasks import Executor, Task
 from benchmarks.store.results import MISSING, SOURCE_CHANGED, ResultRow, Store, identity, plain
 from parapoint.errors import InputError
-from parapoint.files.surfaces import faults_of, read_parameterized
+from parapoint.files.reading import faults_of, read_parameterized
 from parapoint.sources import source_hash
 
 TIME_LIMIT = 1800.0
@@ -278,7 +278,7 @@ def _check_readable(cases: Sequence[str], store: Store) -> None:
     Raises:
         InputError: a file cannot be read, or every model is missing.
     """
-    known, readers = store.surface_hashes(), source_hash("parapoint.files.surfaces")
+    known, readers = store.surface_hashes(), source_hash("parapoint.files.reading")
     missing = []
     for case in cases:
         try:
@@ -293,7 +293,7 @@ def _check_readable(cases: Sequence[str], store: Store) -> None:
 def _surfaces(store: Store, cases: Sequence[str], summary: Summary) -> dict[str, str]:
     """The hash of each case's surface, stored; "" where the model is missing."""
     hashes = {}
-    known, readers = store.surface_hashes(), source_hash("parapoint.files.surfaces")
+    known, readers = store.surface_hashes(), source_hash("parapoint.files.reading")
     before = dict(known)
     for case in cases:
         origin = _origin(case, readers)

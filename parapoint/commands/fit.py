@@ -10,7 +10,7 @@ import click
 
 from parapoint import saving
 from parapoint.commands.fitting import estimator_of, fitted, summary
-from parapoint.files.surfaces import read_surface
+from parapoint.files.reading import read_surface
 
 
 @click.command()

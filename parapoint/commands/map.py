@@ -6,8 +6,8 @@ import json
 
 import click
 
-from parapoint.commands.output import check_target, write
-from parapoint.files.surfaces import read_surface
+from parapoint.commands.output import target, write
+from parapoint.files.reading import read_surface
 
 
 @click.command("map")
@@ -15,15 +15,16 @@ from parapoint.files.surfaces import read_surface
 @click.argument("surface", metavar="INPUT")
 @click.option("--out", required=True, metavar="FILE", help="FILE.obj, .ply or .npz.")
 @click.option("--device", default="auto", show_default=True, help="auto, cpu or cuda.")
+@click.option("--force", is_flag=True, help="Replace files of yours that are in the way.")
 @click.option("--json", "as_json", is_flag=True, help="Print the report as one JSON object.")
-def map_(model: str, surface: str, out: str, device: str, as_json: bool) -> None:
+def map_(model: str, surface: str, out: str, device: str, *, force: bool, as_json: bool) -> None:
     """Apply the model in DIR to other points of its surface, or to a mesh of it.
 
     The fitted points fill the unit square. A mesh written as OBJ is cut along the seams of the
     map: a face that lies across one keeps its shape and stays on one side.
     """
-    check_target(out)
+    out = target(out, surface, force=force, textured=False)
     from parapoint.estimator import load
 
-    facts = write(load(model, device=device), read_surface(surface), out, None)
+    facts = write(load(model, device=device), read_surface(surface), out)
     print(json.dumps(facts) if as_json else f"{out}: {facts['mapped_points']} points mapped")

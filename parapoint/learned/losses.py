@@ -13,7 +13,13 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 EPSILON = 1e-12
-"""Added under square roots whose gradient is infinite at 0, where a map is exactly conformal."""
+"""Added under square roots whose gradient is infinite at 0: of distances, in the shape's radius;
+of stretches, in their own size, so that it stays small where a map shrinks all."""
+SMALLEST = 1e-30
+"""Added where all stretches may be 0, too."""
+
+LARGEST_LOG = 3.0
+"""Deviation of a log area beyond which it counts as this much: 20 times too large or too small."""
 
 
 class NotFiniteError(ArithmeticError):
@@ -104,17 +110,27 @@ def singular_values(tangents: Tensor) -> tuple[Tensor, Tensor]:
     other form loses half of its digits near a conformal map.
     """
     E, F, G = first_fundamental_form(tangents)
-    area = (torch.linalg.cross(tangents[0], tangents[1]).square().sum(1) + EPSILON**2).sqrt()
-    total = (E + G + 2 * area).sqrt()
-    difference = ((E - G).square() + 4 * F.square() + EPSILON).sqrt() / total
+    area = torch.linalg.cross(tangents[0], tangents[1]).square().sum(1)
+    total = (E + G + 2 * (area + _floor(E + G)).sqrt()).sqrt()
+    difference = _split(E, F, G) / total
     return (total + difference) / 2, (total - difference) / 2
 
 
 def gram_eigenvalues(tangents: Tensor) -> tuple[Tensor, Tensor]:
     """λ1 ≥ λ2 (N,) of JᵀJ: the other reading of "eigenvalues of J"; squares of the first."""
     E, F, G = first_fundamental_form(tangents)
-    difference = ((E - G).square() + 4 * F.square() + EPSILON).sqrt()
+    difference = _split(E, F, G)
     return (E + G + difference) / 2, (E + G - difference) / 2
+
+
+def _split(E: Tensor, F: Tensor, G: Tensor) -> Tensor:
+    """λ1² − λ2² of the singular values."""
+    return ((E - G).square() + 4 * F.square() + _floor(E + G)).sqrt()
+
+
+def _floor(stretch: Tensor) -> Tensor:
+    """What is added under the root of a square of stretches of this size."""
+    return EPSILON * stretch.detach().square() + SMALLEST
 
 
 EIGENVALUES = {"singular": singular_values, "gram": gram_eigenvalues}
@@ -155,16 +171,24 @@ def anti_flip_loss(points: Tensor, tangents: Tensor, neighbour_count: int, angle
     return (math.cos(angle) - cosine).clamp(min=0).sum(1).mean()
 
 
-def unfolding_loss(unfolding: Tensor) -> Tensor:
-    """Angle distortion of Unwrap∘Cut on the surface itself; not in the paper.
+def unfolding_loss(unfolding: Tensor, area_weight: float = 0.0) -> Tensor:
+    """Distortion of Unwrap∘Cut on the surface itself; not in the paper.
 
     Mean of (λ1 − λ2)² / (λ1² + λ2²) = (E + G − 2 det) / (E + G), in [0, 2]: 0 where conformal, 1
-    on a collapsed line, above 1 where det < 0, which is a fold.
+    on a collapsed line, above 1 where det < 0, which is a fold. And of the squared deviations of
+    log det from its median, which are the same for a part that is e times too large and for one
+    that is e times too small; by them it pays to cut.
 
     Args:
         unfolding: (2, N, 2) images of two tangent vectors, orthonormal and right-handed around the
             surface's oriented normal.
+        area_weight: of the second part.
     """
     (a, b), (c, d) = unfolding[0].unbind(1), unfolding[1].unbind(1)
-    stretch = a * a + b * b + c * c + d * d
-    return ((stretch - 2 * (a * d - b * c)) / (stretch + EPSILON)).mean()
+    stretch, area = a * a + b * b + c * c + d * d, a * d - b * c
+    angles = ((stretch - 2 * area) / (stretch + EPSILON)).mean()
+    if not area_weight:
+        return angles
+    log_area = area.clamp(min=EPSILON).log()
+    deviation = (log_area - log_area.detach().median()).clamp(-LARGEST_LOG, LARGEST_LOG)
+    return angles + area_weight * deviation.square().mean()

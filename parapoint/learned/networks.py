@@ -86,7 +86,7 @@ ACTIVATIONS: dict[str, Activation] = {"leaky_relu": LeakyReLU(), "squareplus": S
 
 
 NARROW = 32
-"""Layers with fewer inputs or outputs hold coordinates: float32 whatever the precision."""
+"""Products with fewer columns are taken narrow side first."""
 ROOM = 16
 """Channels that a row of activations has beyond its own: the first is the homogeneous coordinate,
 and so many keep the rows aligned to 64 bytes."""
@@ -114,15 +114,11 @@ class _StackFunction(torch.autograd.Function):
     Points and tangents are in homogeneous coordinates, so a layer [W; b] is one product, which adds
     b to points alone, and its gradient is another: no pass over the activations is left but the
     nonlinearity's. With a layer's outputs in the columns, all three products of a layer take and
-    give rows as they lie in memory. The products of wide layers, and what they take and give, are
-    in the precision asked for.
+    give rows as they lie in memory.
     """
 
     @staticmethod
-    def forward(
-        ctx: Any, x: Tensor, activation: Activation, precision: torch.dtype, *layers: Tensor
-    ) -> Tensor:
-        layers = tuple(w.to(precision) if min(w.shape) > NARROW else w for w in layers)
+    def forward(ctx: Any, x: Tensor, activation: Activation, *layers: Tensor) -> Tensor:
         ctx.activation, keeps = activation, any(ctx.needs_input_grad)
         count, points, channels = x.shape
         is_point = x.new_zeros(count, points)
@@ -131,15 +127,13 @@ class _StackFunction(torch.autograd.Function):
         h[:, :, :-1] = x
         inputs: list[Tensor] = []
         for layer in layers[:-1]:
-            h = h.to(layer.dtype)
             if keeps:
                 inputs.append(h)
-            made = _homogeneous(layer.shape[1], is_point.to(layer.dtype))
+            made = _homogeneous(layer.shape[1], is_point)
             z = made[:, :, :-1]
             torch.mm(h.flatten(0, 1), layer, out=z.flatten(0, 1))
             activation.push_(z)
             h = made
-        h = h.to(layers[-1].dtype)
         ctx.save_for_backward(*layers, *inputs, h)
         return _product(h.flatten(0, 1), layers[-1]).reshape(count, points, layers[-1].shape[1])
 
@@ -151,18 +145,16 @@ class _StackFunction(torch.autograd.Function):
         of_layers: list[Tensor] = []
         gradient = output_gradient.flatten(0, 1)
         for layer, h in zip(reversed(layers), reversed(inputs), strict=True):
-            gradient = gradient.to(layer.dtype)
-            of_layer = _product(h.flatten(0, 1).t(), gradient)
-            of_layers.append(of_layer.to(output_gradient.dtype).contiguous())
+            of_layers.append(_product(h.flatten(0, 1).t(), gradient).contiguous())
             is_first = len(of_layers) == count
             if is_first and not ctx.needs_input_grad[0]:
-                return None, None, None, *reversed(of_layers)
+                return None, None, *reversed(of_layers)
             gradient = gradient @ layer[:-1].t()
             if not is_first:
                 made = h[:, :, :-1]
                 ctx.activation.pull_(gradient.view(made.shape), made)
         of_input = gradient.reshape(inputs[0][:, :, :-1].shape)
-        return of_input, None, None, *reversed(of_layers)
+        return of_input, None, *reversed(of_layers)
 
 
 class Stack(nn.Module):
@@ -186,20 +178,18 @@ class Stack(nn.Module):
             uniform = 2 * torch.rand(after, before + 1, generator=generator) - 1
             self.layers.append(nn.Parameter((uniform / before**0.5).t().contiguous()))
         self.activation = activation
-        self.precision = torch.float32
 
     def forward(self, x: Tensor) -> Tensor:
         """(1 + T, N, inputs) points and tangents → (1 + T, N, outputs).
 
-        `precision` holds in training; without gradients all is float32, and no layer's input is
-        kept longer than the layer takes.
+        Without gradients no layer's input is kept longer than the layer takes.
         """
-        precision, layers = self.precision, list(self.layers)
+        layers = list(self.layers)
         if not torch.is_grad_enabled():
-            precision, layers = torch.float32, [layer.detach() for layer in layers]
+            layers = [layer.detach() for layer in layers]
         points = BLOCK // len(x) if x.device.type == "cpu" else max(1, x.shape[1])
         parts = [
-            _StackFunction.apply(part, self.activation, precision, *layers)  # type: ignore[no-untyped-call]
+            _StackFunction.apply(part, self.activation, *layers)  # type: ignore[no-untyped-call]
             for part in torch.split(x, points, dim=1)
         ]
         return torch.cat(parts, dim=1)
@@ -279,12 +269,6 @@ class Cycle(NamedTuple):
 class SurfaceNetworks(nn.Module):
     """Networks made of stacks that map a surface to the plane; what a trainer can train."""
 
-    def train_in(self, precision: torch.dtype) -> None:
-        """Take the products of wide layers in this precision where gradients are asked for."""
-        for module in self.modules():
-            if isinstance(module, Stack):
-                module.precision = precision
-
     def parameterization(self, points: Tensor) -> Tensor:
         """(N, 3) points of the surface → (N, 2) points of the plane."""
         raise NotImplementedError
@@ -306,7 +290,7 @@ class SubNetworks(SurfaceNetworks):
     wrap: nn.Module
     unwrap: nn.Module
 
-    def forward(self, points: Tensor | None, grid: Tensor | None) -> Cycle:
+    def forward(self, points: Tensor | None, grid: Tensor | None, *, slopes: bool = True) -> Cycle:
         """Both branches at points P and lattice G (M, 2); None leaves a branch out.
 
         Both go through Wrap and Stitch, where the tangents are, together.
@@ -314,6 +298,7 @@ class SubNetworks(SurfaceNetworks):
         Args:
             points: (1, N, 3), or (3, N, 3) with two tangent vectors of the surface at each point.
             grid: (M, 2).
+            slopes: whether f_u, f_v and g_u, g_v are wanted; without them `tangents` are (0, N, 3).
         """
         wrapped = []
         if points is not None:
@@ -324,7 +309,7 @@ class SubNetworks(SurfaceNetworks):
             wrapped.append(self.deform(grid[None])[0])
         uv = torch.cat(wrapped)
         axes = torch.eye(2, dtype=uv.dtype, device=uv.device)[:, None].expand(2, len(uv), 2)
-        opened = self.wrap(torch.cat([uv[None], axes]))
+        opened = self.wrap(torch.cat([uv[None], axes]) if slopes else uv[None])
         closed = self.stitch(opened)
         count = 0 if points is None else points.shape[1]
         point_branch = grid_branch = None

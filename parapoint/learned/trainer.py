@@ -16,19 +16,31 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from parapoint.learned import losses
-from parapoint.learned.networks import ACTIVATIONS, Cycle, Networks, SurfaceNetworks
+from parapoint.learned.batches import Cloud, lattice
+from parapoint.learned.networks import Cycle, SubNetworks, SurfaceNetworks
+from parapoint.learned.optimizers import OPTIMIZERS
 from parapoint.learned.presets import Preset
+from parapoint.learned.trained_map import new_networks
 from parapoint.surfaces.sampling import hull_sample, mean_spacing
 from parapoint.surfaces.surface import FloatArray
 
 SNAPSHOTS = 100
 """States kept in a run, evenly: the last good one is where a diverged run begins again."""
-PRECISIONS = {"float32": torch.float32, "bfloat16": torch.bfloat16}
-"""What `Preset.precision` may name."""
 DIVERGED = 10.0
 """A mean loss this many times the phase's lowest has diverged."""
+SHORT = 256
+"""Points of a step where a time budget allows no more."""
+TIMED = range(3, 8)
+"""Steps of so many points that are timed; those before set up what later ones use."""
+DENSER = 4
+"""Under a time budget, which steps of all points would exceed, later ones hold a lattice of so many
+times the points of a step against the cloud. A coarse one draws both sides of a finger inwards."""
+ENOUGH_STEPS = 5_000
+"""A time budget that allows more steps of SHORT points than these gives larger ones in place."""
 SMALLER_STEP = 0.3
 """Factor on the learning rate after a divergence."""
+LAST_RATE = 0.01
+"""The last learning rate over the first; a cosine leads from one to the other."""
 LARGEST_KEPT = 31 * 2**20
 """Bytes of the largest block by whose release glibc learns to keep freed memory: under 32 MiB."""
 
@@ -56,66 +68,18 @@ class Step(NamedTuple):
     losses: dict[str, float]
 
 
-class AdamW:
-    """Adam with decoupled weight decay (Loshchilov and Hutter 2019, algorithm 2).
-
-    The same as `torch.optim.AdamW` with its defaults, whose first use takes two seconds of imports.
-    """
-
-    def __init__(self, parameters: list[Tensor], weight_decay: float) -> None:
-        self.parameters, self.weight_decay = parameters, weight_decay
-        self.steps = [torch.zeros((), device=p.device) for p in parameters]
-        self.first = [torch.zeros_like(p) for p in parameters]
-        self.second = [torch.zeros_like(p) for p in parameters]
-
-    @torch.no_grad()
-    def step(self, learning_rate: float) -> None:
-        """Move the parameters that have a gradient, and drop the gradients."""
-        rows = [
-            (parameter, parameter.grad, *moments)
-            for parameter, *moments in zip(
-                self.parameters, self.first, self.second, self.steps, strict=True
-            )
-            if parameter.grad is not None
-        ]
-        parameters, gradients, first, second, steps = (list(of) for of in zip(*rows, strict=True))
-        torch._foreach_add_(steps, 1)
-        # The kernel that torch.optim calls.
-        torch._fused_adamw_(
-            parameters,
-            gradients,
-            first,
-            second,
-            [],
-            steps,
-            lr=learning_rate,
-            beta1=0.9,
-            beta2=0.999,
-            weight_decay=self.weight_decay,
-            eps=1e-8,
-            amsgrad=False,
-            maximize=False,
-        )
-        for parameter in parameters:
-            parameter.grad = None
-
-    def state(self) -> dict[str, Tensor]:
-        """The moments by name, not copied."""
-        moments = {"steps": self.steps, "first": self.first, "second": self.second}
-        return {f"{name}.{i}": t for name, of in moments.items() for i, t in enumerate(of)}
-
-    def restore(self, state: dict[str, Tensor]) -> None:
-        """Copy in what `state` returned."""
-        for name, tensor in self.state().items():
-            tensor.copy_(state[name])
-
-
 _FACTS = (
     "iteration",
     "seconds",
+    "processor_seconds",
+    "subset",
+    "_timed",
     "divergences",
     "_phase_now",
+    "_start",
     "_lowest",
+    "_last",
+    "_lowest_start",
     "_next_snapshot",
     "_sums",
     "_count",
@@ -137,11 +101,15 @@ class Trainer:
         seed: of all random draws: initial weights, subsets, perturbations.
         device: "cpu" or "cuda".
         time_budget: seconds after which the run ends; the schedule follows the time where that
-            comes before the preset's number of iterations.
-        networks: what to train, all its parameters; new networks of the preset by default.
+            comes before the preset's number of iterations, and the points of a step are as many as
+            leave ENOUGH_STEPS on this machine, from SHORT up to the preset's.
+        networks: what to train, all its parameters; new networks of the preset by default, which
+            may have several starts.
 
     Attributes:
         seconds: spent so far; what was spent before the run may be added, as part of the budget.
+        processor_seconds: time of the processor that went to the steps, all threads together.
+        subset: points of a step before the last phase.
     """
 
     def __init__(
@@ -157,28 +125,25 @@ class Trainer:
         keep_freed_memory()
         self.preset, self.time_budget = preset, time_budget
         self.generator = torch.Generator().manual_seed(seed)
-        if networks is None:
-            networks = Networks(
-                preset.hidden,
-                preset.embedding,
-                ACTIVATIONS[preset.activation],
-                self.generator,
-            )
-        self.networks = networks.to(device)
-        self.precision = usable_precision(preset.precision, device)
-        self.networks.train_in(PRECISIONS[self.precision])
-        self.optimizer = AdamW(list(self.networks.parameters()), preset.weight_decay)
+        self.starts = preset.starts if networks is None else 1
+        self.networks = (self._new_networks() if networks is None else networks).to(device)
+        parameters: list[Tensor] = [p for p in self.networks.parameters() if p.requires_grad]
+        self.optimizer = OPTIMIZERS[preset.optimizer](parameters)
         self.device = device
-        self.shape = self.prepared(points)
-        self.hull = self.shape
+        self.shape = self.hull = Cloud(self.prepared(points), preset.patch)
         if preset.warm_up:
-            self.hull = self.prepared(hull_sample(points, len(points), seed))
+            hull = hull_sample(points, len(points), seed)
+            self.hull = Cloud(self.prepared(hull), preset.patch)
         self.noise = preset.perturbation * mean_spacing(points)
         self.iteration = 0
-        self.seconds = 0.0
+        self.seconds = self.processor_seconds = 0.0
+        self.subset = preset.subset if time_budget is None else min(SHORT, preset.subset)
+        self._timed: list[float] = []
         self.divergences = 0
         self._phase_now = ""
-        self._lowest = math.inf
+        self._start = 0
+        self._lowest = self._last = self._lowest_start = math.inf
+        self._best_start: dict[str, Tensor] = {}
         self._next_snapshot = 1 / SNAPSHOTS
         self._sums: dict[str, float] = {}
         self._count = 0
@@ -210,7 +175,7 @@ class Trainer:
             points if self.preset.branches != "2d" else None,
             grid if self.preset.branches != "3d" else None,
         )
-        return objective_terms(self.preset, cycle, given)
+        return objective_terms(self.preset, cycle, given, self._dense_surface())
 
     @property
     def progress(self) -> float:
@@ -218,8 +183,16 @@ class Trainer:
         by_time = 0.0 if self.time_budget is None else self.seconds / self.time_budget
         return min(1.0, max(self.iteration / self.preset.iterations, by_time))
 
+    @property
+    def schedule(self) -> float:
+        """Where the schedule is, in [0, 1]: as `progress`, but each start begins it anew."""
+        share, others = self.preset.start_share, self.starts - 1
+        return (self.progress - share * min(self._start, others)) / (1 - share * others)
+
     def run(self) -> Iterator[Step]:
         """Train to the end, a `Step` for each iteration; leave the networks at the best state.
+
+        Of several starts the one whose last mean loss is lowest goes on.
 
         Best: the lowest mean loss between two snapshots of the last phase (losses of different
         phases do not compare: the Chamfer distance falls with the number of points).
@@ -228,7 +201,7 @@ class Trainer:
             DivergedError: the loss blew up twice.
         """
         longest = 0.0
-        begin = time.perf_counter()
+        begin, processor = time.perf_counter(), time.process_time()
         while self.progress < 1 and self._fits(longest):
             phase = self._phase()
             if phase != self._phase_now:
@@ -238,21 +211,27 @@ class Trainer:
                 self._sums[name] = self._sums.get(name, 0.0) + value
             self._count += 1
             self.iteration += 1
-            now = time.perf_counter()
+            now, processor_now = time.perf_counter(), time.process_time()
             longest = max(longest, now - begin)
             self.seconds += now - begin  # what is done between steps counts too
-            begin = now
+            self.processor_seconds += processor_now - processor
+            if self.time_budget is not None and self.iteration in TIMED:
+                self._timed.append(now - begin)
+                self._choose_subset(self.time_budget)
+            begin, processor = now, processor_now
             means: dict[str, float] = {}
-            ends_phase = self.progress == 1 or self._phase() != phase
+            ends_phase = self.progress == 1 or self._phase() != phase or self._start_ends()
             if ends_phase or self.progress >= self._next_snapshot:
                 means = {name: total / self._count for name, total in self._sums.items()}
                 self._snapshot(means["total"])
+            if self._start_ends():
+                self._next_start()
             yield Step(self.iteration, self.progress, self.seconds, phase, means)
         self._restore(self._good)
 
     def tensors(self) -> dict[str, Tensor]:
         """What a checkpoint holds as tensors: this state, the last good one, the generator."""
-        kept = {"now": self._state(), "good": self._good}
+        kept = {"now": self._state(), "good": self._good, "start": self._best_start}
         return {
             "generator": self.generator.get_state(),
             **{f"{key}.{name}": t for key, state in kept.items() for name, t in state.items()},
@@ -267,8 +246,37 @@ class Trainer:
         self.generator.set_state(tensors["generator"])
         self._restore(_under("now.", tensors))
         self._good = _under("good.", tensors)
+        self._best_start = _under("start.", tensors)
         for name in _FACTS:
             setattr(self, name, facts[name])
+
+    def _new_networks(self) -> SubNetworks:
+        return new_networks(self.preset, self.generator)
+
+    def _choose_subset(self, budget: float) -> None:
+        """Once the first steps are timed, take as many points as leave enough steps."""
+        if self.iteration == TIMED[-1]:
+            steps = (budget - self.seconds) / float(np.median(self._timed))
+            affordable = round(SHORT * max(1.0, steps / ENOUGH_STEPS))
+            self.subset = min(affordable, self.preset.subset)
+
+    def _start_ends(self) -> bool:
+        """Whether one of several starts is done."""
+        share = self.preset.start_share
+        return 1 < self.starts > self._start and round(self.progress / share, 9) >= self._start + 1
+
+    def _next_start(self) -> None:
+        """Begin the next start; after the last one go on with the best."""
+        if self._last < self._lowest_start:
+            self._lowest_start, self._best_start = self._last, deepcopy(self._state())
+        self._start += 1
+        if self._start < self.starts:
+            self.networks.load_state_dict(self._new_networks().state_dict())
+            begun = {name: torch.zeros_like(t) for name, t in self.optimizer.state().items()}
+            self.optimizer.restore(begun)
+        else:
+            self._restore(self._best_start)
+        self._phase_now, self._good = "", deepcopy(self._state())
 
     def _state(self) -> dict[str, Tensor]:
         """Weights and optimiser state by name, not copied."""
@@ -286,6 +294,7 @@ class Trainer:
         A loss that merely rises is let rise: the run ends with the best state anyhow.
         """
         self._next_snapshot = self.progress + 1 / SNAPSHOTS
+        self._last = total
         self._sums, self._count = {}, 0
         if math.isfinite(total) and total <= DIVERGED * self._lowest:
             if total < self._lowest:
@@ -302,14 +311,14 @@ class Trainer:
         return self.time_budget is None or self.seconds + seconds <= self.time_budget
 
     def _phase(self) -> str:
-        if self.progress < self.preset.warm_up:
+        if self.schedule < self.preset.warm_up:
             return "hull"
-        return "subset" if self.progress < self.preset.all_from else "all"
+        return "subset" if self.schedule < self.preset.all_from else "all"
 
     def _step(self) -> dict[str, float]:
         """One iteration: its unweighted terms and the weighted total."""
         try:
-            terms = self.terms(*self._batch(), self._cloud()[0])
+            terms = self.terms(*self._batch(), self._cloud().points)
         except losses.NotFiniteError:
             return {"total": math.nan}
         total = torch.stack([self.weights[name] * value for name, value in terms.items()]).sum()
@@ -319,29 +328,40 @@ class Trainer:
         return {name: value.item() for name, value in {**terms, "total": total}.items()}
 
     def _learning_rate(self) -> float:
-        first, last = self.preset.learning_rate, self.preset.final_learning_rate
-        cosine = (1 + math.cos(math.pi * self.progress)) / 2
-        return (last + (first - last) * cosine) * SMALLER_STEP**self.divergences
+        first = self.preset.learning_rate or self.optimizer.learning_rate
+        cosine = (1 + math.cos(math.pi * self.schedule)) / 2
+        return first * (LAST_RATE + (1 - LAST_RATE) * cosine) * SMALLER_STEP**self.divergences
 
     def _batch(self) -> tuple[Tensor, Tensor]:
         """Perturbed points of the phase (see `prepared`) and a perturbed lattice (about n, 2)."""
         cloud = self._cloud()
-        size = cloud.shape[1]
-        if self._phase() != "all" and self.preset.subset < size:
-            size = self.preset.subset
-            chosen = torch.randperm(cloud.shape[1], generator=self.generator)[:size]
-            cloud = cloud[:, chosen.to(self.device)]
-        noise = torch.zeros(cloud.shape)
+        takes_all = self._phase() == "all" and self.time_budget is None
+        size = len(cloud.points) if takes_all else self.subset
+        rows = cloud.drawn(size, self.generator)
+        size = rows.shape[1]
+        noise = torch.zeros(rows.shape)
         noise[0] = self.noise * torch.randn(size, 3, generator=self.generator)
         grid = lattice(round(math.sqrt(size)), self.generator)
-        return cloud + noise.to(self.device), grid.to(self.device)
+        return rows + noise.to(self.device), grid.to(self.device)
 
-    def _cloud(self) -> Tensor:
-        """All points that the phase is fitted to (see `prepared`)."""
+    def _dense_surface(self) -> Tensor | None:
+        """(DENSER · M, 3) P̂ of a lattice for the Chamfer distance alone, where one is due."""
+        is_due = self._phase() == "all" and self.time_budget is not None
+        if not is_due or self.preset.branches == "3d":
+            return None
+        networks = self.networks
+        assert isinstance(networks, SubNetworks)
+        grid = lattice(round(math.sqrt(DENSER * self.subset)), self.generator).to(self.device)
+        return networks.surface(networks.deform(grid[None])[0])
+
+    def _cloud(self) -> Cloud:
+        """What the phase is fitted to."""
         return self.hull if self._phase() == "hull" else self.shape
 
 
-def objective_terms(preset: Preset, cycle: Cycle, points: Tensor) -> dict[str, Tensor]:
+def objective_terms(
+    preset: Preset, cycle: Cycle, points: Tensor, made: Tensor | None = None
+) -> dict[str, Tensor]:
     """The unweighted terms of the objective; those of a branch that is left out are missing.
 
     Args:
@@ -350,6 +370,7 @@ def objective_terms(preset: Preset, cycle: Cycle, points: Tensor) -> dict[str, T
         points: (N, 3) all given points. P̂ is held against these also where a sparse subset goes
             through the networks: against the subset alone the Chamfer distance is mostly sampling
             noise, in which the terms of weight 0.01 drown.
+        made: (M, 3) what is held against them, the grid branch's own P̂ by default.
     """
     distortion = losses.DISTORTIONS[preset.distortion]
     eigenvalues = losses.EIGENVALUES[preset.eigenvalues]
@@ -363,10 +384,10 @@ def objective_terms(preset: Preset, cycle: Cycle, points: Tensor) -> dict[str, T
         cycle_terms += [(there.points, there.points_cycle), (there.cut, there.cut_cycle)]
         tangents_at.append((there.points_cycle, there.tangents))
         if len(there.unfolding):
-            terms["unfolding"] = losses.unfolding_loss(there.unfolding)
+            terms["unfolding"] = losses.unfolding_loss(there.unfolding, preset.area_weight)
     if cycle.grid is not None:
         back = cycle.grid
-        terms["wrap"] = losses.wrap_loss(back.points, points)
+        terms["wrap"] = losses.wrap_loss(back.points if made is None else made, points)
         cycle_terms += [(back.uv, back.uv_cycle), (back.cut, back.cut_cycle)]
         tangents_at.append((back.points, back.tangents))
     K, T = preset.anti_flip_neighbours, preset.anti_flip_angle
@@ -390,21 +411,6 @@ def keep_freed_memory() -> None:
     is never written, so it takes no memory; other C libraries see a block come and go.
     """
     torch.empty(LARGEST_KEPT, dtype=torch.uint8)
-
-
-def usable_precision(wanted: str, device: str) -> str:
-    """The precision wanted, or "float32" where the device has no units for it."""
-    if device == "cuda":
-        is_fast = torch.cuda.is_bf16_supported()
-    else:
-        is_fast = torch.cpu._is_amx_tile_supported()  # noqa: SLF001 (there is no public name)
-    return wanted if is_fast else "float32"
-
-
-def lattice(side: int, generator: torch.Generator) -> Tensor:
-    """(side², 2) a lattice of cells in [−1, 1]², one point in each, anywhere in it."""
-    cells = torch.cartesian_prod(torch.arange(side), torch.arange(side))
-    return (cells + torch.rand(side * side, 2, generator=generator)) * (2 / side) - 1
 
 
 def oriented_normals(points: FloatArray, neighbours: int = 12) -> FloatArray:
@@ -433,7 +439,11 @@ def oriented_normals(points: FloatArray, neighbours: int = 12) -> FloatArray:
 
 def tangent_frames(points: FloatArray) -> FloatArray:
     """(2, N, 3) orthonormal tangent vectors, right-handed around the oriented normals."""
-    normals = oriented_normals(points)
+    return tangents_of(oriented_normals(points))
+
+
+def tangents_of(normals: FloatArray) -> FloatArray:
+    """(2, N, 3) orthonormal vectors, right-handed around unit normals (N, 3)."""
     least = np.eye(3)[np.abs(normals).argmin(axis=1)]
     first = np.cross(normals, least)
     first /= np.linalg.norm(first, axis=1, keepdims=True)

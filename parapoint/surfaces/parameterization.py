@@ -126,6 +126,24 @@ class Parameterization:
         return np.asarray(mesh.edges[cut], dtype=np.int64)
 
 
+class Charted(NamedTuple):
+    """A mesh with a map of it.
+
+    Attributes:
+        mesh: the mesh.
+        map: its map, with a row of corners for each of its faces.
+    """
+
+    mesh: Mesh
+    map: Parameterization
+
+    def turned(self) -> Charted:
+        """The other side up: faces turned round, and the plane mirrored, so that none flips."""
+        uv = self.map.uv * [-1.0, 1.0]
+        faces, corners = self.mesh.faces[:, ::-1], self.map.corners[:, ::-1]
+        return Charted(Mesh(self.mesh.vertices, faces), Parameterization(uv, corners))
+
+
 @dataclass(frozen=True, eq=False)
 class PointParameterization:
     """A map of a point cloud to the plane.

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import igl
@@ -237,6 +239,15 @@ class Mesh:
         return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2, dtype=np.float64)
 
 
+def vertex_normals(mesh: Mesh) -> FloatArray:
+    """(V, 3) unit normals of the vertices, the means of the faces around by area; or 0."""
+    normals = np.zeros(mesh.vertices.shape)
+    by_face = mesh.face_areas[:, None] * unit_normals(mesh.vertices, mesh.faces)
+    for corner in mesh.faces.T:
+        np.add.at(normals, corner, by_face)
+    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300))
+
+
 @dataclass(frozen=True, eq=False)
 class PointCloud:
     """Points on a surface.
@@ -245,6 +256,9 @@ class PointCloud:
         points: (P, 3) float64 positions, finite, at least one.
         normals: (P, 3) float64 normals, or None.
         dropped: rows that were left out before, as they were not finite; for reports.
+        attributes: whatever else is known at each point, by name: (P,) or (P, k) numbers of any
+            type. "colours" are (P, 3) or (P, 4) sRGB values, uint8, uint16, or floats from 0 to 1;
+            "intensity" is (P,).
 
     Raises:
         InputError: a shape or a value is not as said.
@@ -253,6 +267,7 @@ class PointCloud:
     points: FloatArray
     normals: FloatArray | None = None
     dropped: int = 0
+    attributes: Mapping[str, npt.NDArray[Any]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         points = read_only(self.points, np.float64, "points", 3)
@@ -264,6 +279,30 @@ class PointCloud:
             if len(normals) != len(points):
                 raise InputError(f"{len(normals)} normals for {len(points)} points")
             object.__setattr__(self, "normals", normals)
+        given = {name: _attribute(name, of, len(points)) for name, of in self.attributes.items()}
+        object.__setattr__(self, "attributes", MappingProxyType(given))
+
+
+def _attribute(name: str, values: Any, count: int) -> npt.NDArray[Any]:
+    """A read-only view of one attribute of `count` points.
+
+    Raises:
+        InputError: it has another length, or is no array of numbers; colours are no colours.
+    """
+    array = np.asarray(values).view()
+    if array.ndim not in (1, 2) or array.dtype.kind not in "biuf":
+        raise InputError(f"{name} must be numbers of shape (n,) or (n, k), not {array.shape}")
+    if len(array) != count:
+        raise InputError(f"{len(array)} {name} for {count} points")
+    if name == "colours":
+        if array.ndim != 2 or array.shape[1] not in (3, 4):
+            raise InputError(f"colours must have shape (n, 3) or (n, 4), not {array.shape}")
+        if array.dtype.kind != "f" and array.dtype not in (np.uint8, np.uint16):
+            raise InputError(f"colours must be uint8, uint16 or floats, not {array.dtype}")
+        if array.dtype.kind == "f" and not ((array >= 0) & (array <= 1)).all():
+            raise InputError("colours that are floats must lie between 0 and 1")
+    array.setflags(write=False)
+    return array
 
 
 Surface = Mesh | PointCloud

@@ -269,9 +269,12 @@ def test_the_time_that_remains_is_told_by_the_pace_of_the_steps(monkeypatch) -> 
 def test_the_report_and_the_trace_say_what_was_done() -> None:
     cloud = PointCloud(paraboloid())
     result = ParaPoint(**TINY).parameterize(cloud, seed=5)
-    expected = {"preset": "paper", "points": 150, "iterations": 6, "device": "cpu", "warm_up": 0.15}
+    expected = {"preset": "paper", "points": 150, "iterations": 6, "device": "cpu"}
     assert expected.items() <= result.report.items()
     assert result.report["weights"]["wrap"] == presets.PAPER.wrap_weight
+    for name in ("warm_up", "optimizer", "starts"):
+        assert result.report[name] == getattr(presets.PAPER, name)
+    assert 0 < result.report["processor_seconds"] < 60
     assert [point.iteration for point in result.trace] == [1, 2, 3, 4, 5, 6]
     assert {"wrap", "cycle", "total"} <= result.trace[0].values.keys()
     maps = [point.uv for point in result.trace if point.uv is not None]

@@ -58,7 +58,7 @@ DEPENDENCIES = {
     "parapoint/surfaces/__init__.py": "parapoint.surfaces.cutting",
     "parapoint/surfaces/surface.py": "benchmarks.metrics.table",
     "benchmarks/metrics/overlap.py": "benchmarks.metrics.table",
-    "parapoint/files/point_formats.py": "parapoint.files.surfaces",
+    "parapoint/files/pcd.py": "parapoint.files.reading",
     "parapoint/learned/losses.py": "parapoint.learned.parapoint",
     "parapoint/computed/scale.py": "baselines.hybrid",
     "baselines/disks/tutte.py": "baselines.disks.slim",

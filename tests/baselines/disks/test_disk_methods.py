@@ -14,7 +14,7 @@ from baselines.disks.flattening import (
     signed_areas,
     singular_values,
 )
-from baselines.disks.slim import SLIM, map_energy
+from baselines.disks.slim import DENSITIES, SLIM, map_energy
 from baselines.disks.tutte import Tutte, tutte
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
@@ -257,14 +257,36 @@ def test_slim_trace_has_the_energy_of_each_step(energy):
     assert again == pytest.approx(values[-1], rel=1e-9)
 
 
-def test_slim_at_its_minimum_is_no_failure():
-    # A flat regular hexagon: Tutte's embedding is it.
-    angle = np.arange(6) * np.pi / 3
-    rim = np.stack([np.cos(angle), np.sin(angle), np.zeros(6)], axis=1)
-    around = np.arange(6)
-    faces = np.stack([np.full(6, 6), around, (around + 1) % 6], axis=1)
-    mesh = Mesh(np.vstack([rim, [[0, 0, 0]]]), faces)
-    assert_allclose(stretches(mesh, mapped("slim", mesh)), 1, atol=1e-6)
+@pytest.mark.parametrize("energy", sorted(DENSITIES))
+@pytest.mark.parametrize(("sides", "height"), [(3, 1), (4, 0.5), (5, 0.5), (6, 0), (8, 2)])
+def test_slim_at_its_minimum_is_no_failure(sides, height, energy):
+    """Tutte's embedding of a regular cone is its minimum already, whatever the unit."""
+    around = np.arange(sides)
+    angle = 2 * np.pi * around / sides
+    rim = np.stack([np.cos(angle), np.sin(angle), np.zeros(sides)], axis=1)
+    faces = np.stack([np.full(sides, sides), around, (around + 1) % sides], axis=1)
+    for unit in (1e-3, 1, 1e3):
+        mesh = Mesh(unit * np.vstack([rim, [[0, 0, height]]]), faces)
+        report = SLIM(energy).parameterize(mesh, seed=0).report
+        assert report["end_energy"] == pytest.approx(report["start_energy"], rel=1e-6, abs=1e-12)
+        if (sides, height) == (6, 0):
+            assert report["end_energy"] == pytest.approx(DENSITIES[energy][1], abs=1e-9)
+
+
+def test_slim_on_a_pyramid():
+    """Equal faces, each stretched by √2 more in one direction: 2 (√2 + 1/√2) at the best scale."""
+    rim = np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]])
+    faces = [[4, 0, 1], [4, 1, 2], [4, 2, 3], [4, 3, 0]]
+    mesh = Mesh(np.vstack([rim, [[0, 0, 1]]]), faces)
+    assert mapped("slim", mesh).report["end_energy"] == pytest.approx(18**0.5, rel=1e-9)
+
+
+def test_a_start_that_could_fall_is_not_the_minimum(monkeypatch):
+    """A solver that gives its start back is found out, whatever the energy."""
+    monkeypatch.setattr("baselines.disks.slim.stepper", lambda _disk, uv, _energy: lambda _: uv)
+    for energy in DENSITIES:
+        with pytest.raises(FlatteningError, match="did not fall"):
+            SLIM(energy).parameterize(irregular_disk(), seed=0)
 
 
 def test_slim_says_what_is_wrong_with_a_start():

@@ -43,7 +43,6 @@ def test_the_encoding_pushes_tangents_forward():
 
 def test_texture_coordinates_push_tangents_forward_and_fill_the_unit_square():
     networks = NuvoNetworks(generator()).double()
-    networks.train_in(torch.float64)
     x = torch.rand(3, 5, 3, dtype=torch.float64, generator=generator())
     uv = networks.texture(x)[0]
     assert ((uv > 0) & (uv < 1)).all()
@@ -59,7 +58,7 @@ def test_fam_holds_its_normals_against_those_given():
     normals = there.cut_cycle[:, 3:]
     aligned = torch.stack([batch[0][0], normals.detach()])
     opposite = torch.stack([batch[0][0], -normals.detach()])
-    given = made.shape[0]
+    given = made.shape.points
     cycles = [made.terms(rows, batch[1], given)["cycle"].item() for rows in (aligned, opposite)]
     plain = (there.points_cycle - batch[0][0]).abs().mean() + (back.uv_cycle - back.uv).abs().mean()
     assert cycles[0] == pytest.approx(plain.item(), rel=1e-5)
@@ -71,7 +70,9 @@ def test_fam_leaves_the_normals_out_where_there_are_none():
     points, grid = made._batch()
     there, back = made.networks(points, grid)
     plain = (there.points_cycle - points[0]).abs().mean() + (back.uv_cycle - back.uv).abs().mean()
-    assert made.terms(points, grid, made.shape[0])["cycle"].item() == pytest.approx(plain.item())
+    assert made.terms(points, grid, made.shape.points)["cycle"].item() == pytest.approx(
+        plain.item()
+    )
 
 
 def test_nuvo_finds_no_fault_with_perpendicular_images_of_even_area(monkeypatch):
@@ -83,7 +84,7 @@ def test_nuvo_finds_no_fault_with_perpendicular_images_of_even_area(monkeypatch)
         return torch.cat([x[:1, :, :2], axes[:, None].expand(2, x.shape[1], 2)])
 
     monkeypatch.setattr(NuvoNetworks, "texture", stretched)
-    terms = made.terms(points, grid, made.shape[0])
+    terms = made.terms(points, grid, made.shape.points)
     assert terms["conformal"].item() == 0
     assert terms["stretch"].item() == pytest.approx(0, abs=1e-12)
 

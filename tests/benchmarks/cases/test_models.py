@@ -16,7 +16,7 @@ from benchmarks.cases import models
 from benchmarks.cases.builtin import BUILTIN
 from benchmarks.cases.models import MissingModelError
 from parapoint import InputError, Mesh, PointCloud
-from parapoint.files.surfaces import read_parameterized
+from parapoint.files.reading import read_parameterized
 
 MODELS = list(models.registry().values())
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from benchmarks.checks import fuzzing
 from parapoint.errors import InputError
-from parapoint.files.surfaces import read_surface
+from parapoint.files.reading import read_surface
 
 HOSTILE = [
     b"",

@@ -13,7 +13,7 @@ from benchmarks.commands.score import json_values, map_state, number, same_faces
 from benchmarks.metrics.grades import GRADES
 from benchmarks.metrics.table import METRICS, MapState, evaluate
 from parapoint import Mesh, console
-from parapoint.files.surfaces import read_parameterized
+from parapoint.files.reading import read_parameterized
 
 # Two quads side by side; the second is drawn twice as long, in a chart of its own.
 OBJ = """v 0 0 0

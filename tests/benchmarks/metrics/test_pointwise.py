@@ -100,6 +100,16 @@ def test_two_sheets_on_one_another_collide():
     assert stacked["neighbour_trustworthiness"] < apart["neighbour_trustworthiness"]
 
 
+@pytest.mark.parametrize(("apart", "share"), [(20, 0), (21, 34 / 42)])
+def test_only_what_lies_five_neighbourhoods_away_collides(apart, share):
+    # Points at 0, 1, 2, ... on a line: the 8th neighbour of all but the 4 at each end is 4 away.
+    # The map puts each point beside the one `apart` away, which collides from above 5 * 4 on.
+    x = np.arange(2.0 * apart)
+    uv = np.column_stack([10 * (x % apart) + (x >= apart), 0 * x])
+    values = scores(np.column_stack([x, 0 * x]), uv)
+    assert_allclose(values["uv_collision_fraction"], share, rtol=EXACT)
+
+
 def test_seam_points_by_hand():
     # Nine points on a line, of which the map moves the last three away by a fifth of L.
     x = np.arange(9.0)

@@ -182,3 +182,33 @@ def test_a_map_is_at_the_layout_when_it_is_that_and_not_merely_near(monkeypatch)
     i, j = mesh.edges.T
     lengths = [np.linalg.norm(of[i] - of[j], axis=1) for of in (mesh.vertices, led)]
     np.testing.assert_allclose(lengths[1], lengths[0], rtol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("turn", "growth", "is_apart"),
+    [
+        (300, 0.0, True),  # the ends of the strip are 60 degrees apart
+        (420, 0.0, False),  # the last 60 degrees cover the first ones
+        (420, 0.05, False),  # a turn later it has moved out by 0.3: less than its width
+        (420, 0.15, True),  # by 0.9: more than that
+    ],
+)
+def test_a_strip_of_width_a_half_that_winds_around_a_circle(
+    turn: float, growth: float, is_apart: bool
+) -> None:
+    angle = np.radians(np.linspace(0, turn, 31))
+    for start in (0.0, 1.0, 2.0, 3.0):
+        unit = np.column_stack([np.cos(angle + start), np.sin(angle + start)])
+        radii = 1 + growth * angle[:, None], 1.5 + growth * angle[:, None]
+        uv = np.concatenate([radius * unit for radius in radii])
+        mesh = Mesh(np.pad(uv, ((0, 0), (0, 1))), grid(31, 2)[:, ::-1])
+        assert (signed_areas(uv, mesh.faces) > 0).all()
+        assert is_bijective(mesh, uv) == is_apart
+
+
+def test_the_two_long_sides_of_a_slanted_strip_do_not_cross() -> None:
+    # Their boxes overlap, but all of one is to the left of the other.
+    uv = np.array([[0.2, 0.05], [1.3, 1.15], [1.0, 1.0], [0.0, 0.0]])
+    mesh = Mesh(np.pad(uv, ((0, 0), (0, 1))), [[0, 1, 2], [0, 2, 3]])
+    assert (signed_areas(uv, mesh.faces) > 0).all()
+    assert is_bijective(mesh, uv)

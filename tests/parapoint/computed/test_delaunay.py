@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from parapoint.computed.delaunay import delaunay_complex, empty_radii, insideness
 
@@ -51,3 +52,30 @@ def test_a_bowl_has_an_inside_though_it_is_open() -> None:
     inside = insideness(of) > 0
     middle = of.sites[of.tetrahedra].mean(axis=1)
     assert inside[np.linalg.norm(middle, axis=1) < 0.5].all()
+
+
+def test_the_centre_of_a_smallest_empty_ball_is_nearest_to_the_triangle() -> None:
+    # The centres of balls through a triangle's corners lie on a line through its circumcentre m, at
+    # height t, with radius² = R² + t². A ball that reaches the apex p of the tetrahedron on one
+    # side has t = (|p − m|² − R²) / 2 n·(p − m); between the t of both sides the balls are empty.
+    points = np.random.default_rng(0).normal(size=(60, 3))
+    of = delaunay_complex(points, np.zeros(60))
+    found = empty_radii(of)
+    is_beside = np.zeros(len(found), dtype=bool)
+    for row, (triangle, sides) in enumerate(zip(of.triangles, of.sides, strict=True)):
+        a, b, c = of.sites[triangle]
+        normal = np.cross(b - a, c - a)
+        unit = normal / np.linalg.norm(normal)
+        equal = np.array([b - a, c - a, unit])
+        middle = np.linalg.solve(equal, [(b @ b - a @ a) / 2, (c @ c - a @ a) / 2, unit @ a])
+        squared = (a - middle) @ (a - middle)
+        heights = []
+        for side in sides:
+            (apex,) = np.setdiff1d(of.tetrahedra[side], triangle)
+            p = of.sites[apex] - middle
+            heights.append((p @ p - squared) / (2 * unit @ p))
+        nearest = np.clip(0.0, min(heights), max(heights))
+        is_beside[row] = nearest != 0
+        assert found[row] == pytest.approx(np.sqrt(squared + nearest**2), rel=1e-6)
+    assert is_beside.any()
+    assert not is_beside.all()

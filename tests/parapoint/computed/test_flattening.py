@@ -2,8 +2,19 @@ import numpy as np
 import pytest
 
 from benchmarks.cases.builtin import sphere, torus
-from parapoint.computed.flattening import FlatMap, _chosen_copies, _scale_cuts, flat_map
-from parapoint.computed.reconstruction import ReconstructionError
+from parapoint.computed import flattening
+from parapoint.computed.bijection import signed_areas
+from parapoint.computed.flattening import (
+    FlatMap,
+    _chosen_copies,
+    _graph,
+    _joined_loops,
+    _scale_cuts,
+    _seamed,
+    _vertex_jacobians,
+    flat_map,
+)
+from parapoint.computed.reconstruction import ReconstructionError, triangulation
 from parapoint.surfaces.cutting import cut_along
 from parapoint.surfaces.surface import Mesh
 
@@ -120,14 +131,18 @@ def test_a_tube_is_slit_along_its_side_and_unrolled() -> None:
     np.testing.assert_allclose(around[-1], 23, atol=1e-6)
 
 
-def plate_with_pins(side: int, pins: list[tuple[int, int]]) -> Mesh:
-    """A square of side² vertices, with a tube of six sides and rows on each vertex given."""
+def grid(side: int) -> Mesh:
+    """A square of side² vertices; vertex side · y + x, diagonals up to the right."""
     x, y = (of.ravel() for of in np.meshgrid(np.arange(side), np.arange(side)))
     corner = (side * np.arange(side - 1)[:, None] + np.arange(side - 1)).ravel()
-    faces = np.concatenate(
-        [corner[:, None] + [0, 1, side + 1], corner[:, None] + [0, side + 1, side]]
-    )
-    plate, count = np.stack([x, y, 0 * x], axis=1), side**2
+    sides = [0, 1, side + 1], [0, side + 1, side]
+    faces = np.concatenate([corner[:, None] + np.array(of) for of in sides])
+    return Mesh(np.stack([x, y, 0 * x], axis=1), faces)
+
+
+def plate_with_pins(side: int, pins: list[tuple[int, int]]) -> Mesh:
+    """A square of side² vertices, with a tube of six sides and rows on each vertex given."""
+    plate, faces, count = grid(side).vertices.copy(), grid(side).faces, side**2
     points = [plate]
     for middle, rows in pins:
         faces = faces[(faces != middle).all(axis=1)]
@@ -157,19 +172,103 @@ def test_of_two_pins_that_is_cut_whose_cut_gains_more_for_each_edge() -> None:
     assert (copied[:, 0] <= 4).all()
 
 
-def test_a_toothed_seam_runs_between_two_rows_of_points() -> None:
-    # The slit goes up columns 5 and 6 of a grid whose cells have a diagonal up to the right. With
-    # column 5 on its left bank and 6 on its right the seam is crossed by the two edges to the right
-    # of each of (5, 0) to (5, 3), less the slit's last edge: 7. With one bank for all it is 10.
-    x, y = (of.ravel() for of in np.meshgrid(np.arange(11), np.arange(11)))
-    corner = (11 * np.arange(10)[:, None] + np.arange(10)).ravel()
-    faces = np.concatenate([corner[:, None] + [0, 1, 12], corner[:, None] + [0, 12, 11]])
-    mesh = Mesh(np.stack([x, y, 0 * x], axis=1), faces)
-    path = np.array([5, 16, 28, 27, 39, 38, 50])  # (5, 0), (5, 1), (6, 2), (5, 2), (6, 3), ...
+def test_a_tip_is_far_from_the_boundary_and_in_its_scale_from_the_mean(monkeypatch) -> None:
+    # The log scale falls by the row of a pin: the one near the rim, of 22 rows, is the more extreme
+    # of the two, but its tip is 24 edges from the boundary, that of the other, of 20 rows, 30.
+    # 20 · 30 is more than 22 · 24, so the one tip that is tried is in the middle.
+    monkeypatch.setattr(flattening, "TIPS", 1)
+    mesh = plate_with_pins(21, [(220, 20), (213, 22)])
+    copied = _scale_cuts(mesh, 30).vertices[len(mesh.vertices) :]
+    assert len(copied) == 30
+    assert np.abs(copied[copied[:, 2] > 0, :2] - 10).max() <= 1
+
+
+def edges_across(mesh: Mesh, path: list[int]) -> np.ndarray:
+    """(n, 2) the edges between points on different sides, where the mesh is slit along a path."""
     disk = cut_along(mesh, np.stack([path[:-1], path[1:]], axis=1))
     origin = np.empty(len(disk.vertices), dtype=np.int64)
     origin[disk.faces] = mesh.faces
     chosen = _chosen_copies(disk, origin)
     joined = set(map(tuple, np.sort(disk.edges, axis=1).tolist()))
     images = map(tuple, np.sort(chosen[mesh.edges], axis=1).tolist())
-    assert sum(pair not in joined for pair in images) == 7
+    return mesh.edges[[pair not in joined for pair in images]]
+
+
+def test_a_toothed_seam_runs_between_two_rows_of_points() -> None:
+    # The slit goes up columns 5 and 6 of a grid whose cells have a diagonal up to the right. With
+    # column 5 on its left bank and 6 on its right the seam is crossed by the two edges to the right
+    # of each of (5, 0) to (5, 3), less the slit's last edge: 7. With one bank for all it is 10.
+    path = [5, 16, 28, 27, 39, 38, 50]  # (5, 0), (5, 1), (6, 2), (5, 2), (6, 3), ...
+    assert len(edges_across(grid(11), path)) == 7
+
+
+def test_no_point_has_most_of_its_edges_across_the_seam() -> None:
+    # A slit from (4, 0) up to the right that bends back down. The fewest edges are across where the
+    # point at its bend, of six edges, has four of them across: it would be a notch.
+    mesh = grid(9)
+    across = edges_across(mesh, [4, 14, 24, 33, 34, 25, 16])
+    share = np.bincount(across.ravel(), minlength=81) / np.bincount(mesh.edges.ravel())
+    assert 0 < share.max() <= 0.5
+
+
+def test_a_flat_ring_stays_a_ring_though_its_hole_has_the_longer_boundary() -> None:
+    # Its outer loop turns by 2π, the star in its middle by −2π: so they are, and nothing is joined.
+    turn = 2 * np.pi * np.arange(24) / 24
+    rows = [np.where(np.arange(24) % 2, 1.9, 1.0), np.full(24, 2.2), np.full(24, 2.5)]
+    ring = np.concatenate([np.stack([r * np.cos(turn), r * np.sin(turn)], axis=1) for r in rows])
+    a = np.arange(48)
+    b = a - a % 24 + (a + 1) % 24
+    faces = np.concatenate(
+        [np.stack([a, b + 24, b], axis=1), np.stack([a, a + 24, b + 24], axis=1)]
+    )
+    mesh = Mesh(np.pad(ring, ((0, 0), (0, 1))), faces)
+    assert mesh.boundary_loops[0].max() < 24  # the star
+    assert _joined_loops(mesh) is mesh
+
+
+def test_cuts_are_at_most_2_2_percent_of_the_faces_of_an_open_surface() -> None:
+    # Cuts to all three pins would pay, and take 40 edges. But the plate has 800 faces and the pins
+    # 12 (16 + 14 + 14), so 29 are cut at most.
+    mesh = plate_with_pins(21, [(220, 16), (213, 14), (227, 14)])
+    assert len(mesh.faces) == 1328
+    assert 16 <= len(_seamed(mesh).vertices) - len(mesh.vertices) <= 29
+
+
+def test_cuts_are_at_most_3_7_percent_of_the_faces_of_a_closed_surface() -> None:
+    # The same plate, closed by 80 triangles to a point below, has 1,408 faces, so 52 edges are cut
+    # at most, those that open it to a disk among them. Cuts to all pins would take 74.
+    plate = plate_with_pins(21, [(220, 16), (213, 14), (227, 14)])
+    (rim,) = plate.boundary_loops
+    below = len(plate.vertices)
+    fan = np.stack([np.roll(rim, -1), rim, np.full(len(rim), below)], axis=1)
+    points = np.concatenate([plate.vertices, [[10.0, 10, -5]]])
+    mesh = Mesh(points, np.concatenate([plate.faces, fan]))
+    assert mesh.topology == "sphere"
+    assert len(mesh.faces) == 1408
+    assert 32 <= len(_seamed(mesh).vertices) - len(mesh.vertices) <= 52
+
+
+def test_a_vertex_s_derivative_is_the_mean_of_its_faces_by_area() -> None:
+    # To the right of x = 0, area 1/2, the map is the identity; to the left, area 3/2, it doubles x.
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [-3, 0, 0]])
+    mesh = Mesh(points, [[0, 1, 2], [0, 2, 3]])
+    uv = np.array([[0.0, 0], [1, 0], [0, 1], [-6, 0]])
+    jacobians = _vertex_jacobians(mesh, uv)
+    for vertex, slope in enumerate([1.75, 1.0, 1.75, 2.0]):
+        np.testing.assert_allclose(jacobians[vertex], [[slope, 0, 0], [0, 1, 0]], atol=1e-12)
+
+
+def test_a_cut_costs_its_length_and_its_edges() -> None:
+    # The sides of a right triangle, 3, 4 and 5, each with their mean, 4.
+    graph = _graph(Mesh([[0, 0, 0], [3, 0, 0], [0, 4, 0]], [[0, 1, 2]])).toarray()
+    np.testing.assert_allclose(graph, [[0, 7, 8], [7, 0, 9], [8, 9, 0]])
+
+
+def test_a_map_keeps_the_area() -> None:
+    # Of a cap that needs no cut each point has one image, so its triangulation has one, too.
+    plane = np.random.default_rng(0).uniform(-1, 1, (900, 2))
+    plane = plane[(plane**2).sum(axis=1) < 0.6]
+    points = np.column_stack([plane, np.sqrt(1 - (plane**2).sum(axis=1))])
+    flat, mesh = flat_map(points), triangulation(points)
+    assert flat.facts["seam_edges"] == 0
+    assert signed_areas(flat.uv, mesh.faces).sum() == pytest.approx(mesh.face_areas.sum())

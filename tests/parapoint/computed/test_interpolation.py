@@ -77,3 +77,28 @@ def test_the_inverse_of_a_map_undoes_it() -> None:
     np.testing.assert_allclose(made.flatten(made.lift(uv)), uv, atol=1e-12)
     restored = InterpolatedMap.restored(made.arrays())
     assert np.array_equal(restored.lift(uv), made.lift(uv))
+
+
+def test_the_steeper_of_two_anchors_says_what_a_jump_is() -> None:
+    # 20 anchors in a row, one apart, of slope 1 up to the tenth and of slope 4 from there on. A
+    # step of 9 between these two is more than 3 · 1, but not than 3 · 4.
+    points = np.column_stack([np.arange(20.0), np.zeros(20), np.zeros(20)])
+    steep = points[:, 0] > 9.5
+    slope = np.where(steep, 4.0, 1.0)[:, None, None] * np.eye(3)
+    values = points * np.where(steep, 4.0, 1.0)[:, None] + [[-22.0, 0, 0]] * steep[:, None]
+    assert values[10, 0] - values[9, 0] == 9
+    near = Interpolant.of(Anchors(points, values, slope)).neighbours
+    assert 10 in near[9]
+    assert 9 in near[10]
+
+
+def test_the_six_nearest_anchors_are_blended_and_the_seventh_is_the_reach() -> None:
+    # In a row, one apart: midway between two, six are at 1/2, 3/2 and 5/2, and R = 7/2. The map
+    # says y = x, but for one anchor at distance 1/2 that says 1/100 more: as much as its weight,
+    # of twice (2 − 2/7)², (2/3 − 2/7)² and (2/5 − 2/7)², counts.
+    points = np.column_stack([np.arange(20.0), np.zeros(20), np.zeros(20)])
+    values = points + [[0.01, 0, 0]] * (points[:, :1] == 9)
+    made = Interpolant.of(Anchors(points, values, np.repeat(np.eye(3)[None], 20, axis=0)))
+    weight = [(2 / k - 2 / 7) ** 2 for k in (1, 3, 5)]
+    found = made(np.array([[9.5, 0.0, 0.0]]))
+    np.testing.assert_allclose(found, [[9.5 + 0.01 * weight[0] / (2 * sum(weight)), 0, 0]])

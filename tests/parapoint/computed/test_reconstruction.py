@@ -1,7 +1,14 @@
 import numpy as np
 import pytest
 
-from parapoint.computed.reconstruction import _filled, _Front, _single_fans, triangulation
+from parapoint.computed.reconstruction import (
+    _filled,
+    _Front,
+    _single_fans,
+    defects,
+    roughness,
+    triangulation,
+)
 from parapoint.surfaces.surface import Mesh
 
 
@@ -77,3 +84,37 @@ def test_a_hole_is_filled_in_the_faces_orientation() -> None:
     assert len(loops) == 1
     filled = Mesh(whole.vertices, _filled(whole.vertices, holed, loops))
     assert filled.topology == "sphere"
+
+
+def test_a_front_goes_straight_on_unless_a_bend_is_much_smaller() -> None:
+    # At one edge a triangle goes straight on, of radius 1, and one turns up by 90 degrees, whose
+    # radius counts (1 + 2 (1 − 0)) times: at 0.8 as 2.4, at 0.3 as 0.9.
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0.5, -1, 0], [0.5, 1, 0], [0.5, 0, 1]])
+    triangles = np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]])
+    for radius, third in ((0.8, 3), (0.3, 4)):
+        front = _Front(points, triangles, np.array([0.2, 1.0, radius]), 2.0)
+        faces = front.grown()
+        assert len(faces) == 2
+        assert third in faces[1]
+
+
+def test_defects_are_counted() -> None:
+    # A strip of two triangles has four boundary edges; bent by 120 degrees it has a fold, too, and
+    # a point that no triangle uses is another. A boundary edge is as rough as two quarter turns.
+    for bend, folds in ((0.0, 0), (2 * np.pi / 3, 1)):
+        up = [0.5, np.cos(bend), np.sin(bend)]
+        points = [[0.0, 0, 0], [1, 0, 0], [0.5, -1, 0], up, [9, 9, 9]]
+        mesh = Mesh(points, [[1, 0, 2], [0, 1, 3]])
+        assert defects(mesh) == 4 + 1 + folds
+        assert roughness(mesh) == pytest.approx(2 * 4 + 1 + bend / (np.pi / 2))
+    # A handle counts 30, and a torus of fine rows has nothing else.
+    assert defects(triangulation(torus())) == 30
+
+
+def test_a_hole_is_closed_across_its_shorter_diagonal() -> None:
+    # A rhombus with diagonals of 1 and 3 between four triangles.
+    rhombus = [[0.5, 0, 0], [0, 1.5, 0], [-0.5, 0, 0], [0, -1.5, 0]]
+    outer = [[2, 2, 0], [-2, 2, 0], [-2, -2, 0], [2, -2, 0]]
+    around = np.array([[0, 4, 1], [1, 5, 2], [2, 6, 3], [3, 7, 0]])
+    filled = _filled(np.array(rhombus + outer, dtype=float), around, [np.array([0, 3, 2, 1])])
+    assert sorted(map(sorted, filled[4:].tolist())) == [[0, 1, 2], [0, 2, 3]]

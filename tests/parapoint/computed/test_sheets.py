@@ -105,3 +105,15 @@ def test_normals_of_a_circle_agree_though_they_turn() -> None:
     np.testing.assert_allclose(unit_normals(mesh.vertices, mesh.faces), normals[[0, 2]], atol=1e-12)
     signs = _signs(mesh.vertices, normals, np.array([[0, 1, 2]]), mesh)
     assert signs.tolist() == [1] * 7
+
+
+def test_triangles_do_not_close_a_bay_of_a_sheet() -> None:
+    # The lowest row of a grid of distance 1 is on an arch of radius 8. Three points in turn on it
+    # lie on a circle of that size with no point inside, and above the largest that counts, 1.5
+    # times the distance to six neighbours, which is 1 to 1.6 there.
+    x, y = (of.ravel().astype(float) for of in np.indices((11, 6)))
+    arch = np.sqrt(64 - (x - 5) ** 2) - 8
+    points = np.stack([x, y + arch, 0 * x], axis=1)
+    triangles, _ = sheet_triangles(points, np.tile([0.0, 0, 1], (66, 1)))
+    assert len(triangles) > 80
+    assert not (y[triangles] == 0).all(axis=1).any()

@@ -133,3 +133,35 @@ def test_unwrap_loss_holds_the_box_fixed() -> None:
     expected = tensor([[0.5, 0.0], [-0.5, 0.0], [0.0, 0.0], [0.0, 0.0]])
     assert uv.grad is not None
     torch.testing.assert_close(uv.grad, expected)
+
+
+def test_unwrap_loss_measures_the_longer_side_of_the_box() -> None:
+    # Four points in a box of 4 by 1, so L = 4 and epsilon is 1 as in the first example. The pairs
+    # (0, 1), (0, 3) and (1, 3) are 0.25, 1 and √1.0625 apart, so the same 0.375 is left.
+    uv = tensor([[0.0, 0.0], [0.25, 0.0], [4.0, 0.0], [0.0, 1.0]])
+    assert float(losses.unwrap_loss(uv, 2, 0.5)) == pytest.approx(0.375, rel=1e-5)
+
+
+def test_anti_flip_loss_adds_up_over_the_neighbours_of_a_point() -> None:
+    # Three points, the last one's normal reversed, K = 2: each sees the two others. The first two
+    # see one that turns away, cos = −1, the last one sees two: (1 + 1 + 2) / 3.
+    points = tensor([[0.0, 0, 0], [1.0, 0, 0], [3.0, 0, 0]])
+    v = tensor([[0.0, 1, 0], [0.0, 1, 0], [0.0, -1, 0]])
+    J = torch.stack([tensor([[1.0, 0, 0]]).repeat(3, 1), v])
+    assert float(losses.anti_flip_loss(points, J, 2, math.pi / 2)) == pytest.approx(4 / 3)
+
+
+@pytest.mark.parametrize("eigenvalues", losses.EIGENVALUES.values(), ids=losses.EIGENVALUES)
+@pytest.mark.parametrize("scale", [1e-5, 1e-3, 1e3])
+def test_values_and_gradients_of_a_map_scale_with_it(eigenvalues, scale: float) -> None:
+    """A map that starts a thousand times too small is judged as it would be at its size."""
+    at_one = torch.randn(2, 50, 3, generator=torch.Generator().manual_seed(0)).requires_grad_()
+    scaled = (scale * at_one.detach()).requires_grad_()
+    power = 2 if eigenvalues is losses.gram_eigenvalues else 1
+    for value, own in zip(eigenvalues(at_one), eigenvalues(scaled), strict=True):
+        torch.testing.assert_close(own / scale**power, value, rtol=1e-4, atol=1e-5)
+    losses.conformal_loss(*eigenvalues(at_one)).backward()
+    losses.conformal_loss(*eigenvalues(scaled)).backward()
+    torch.testing.assert_close(
+        scaled.grad / scale ** (power - 1), at_one.grad, rtol=1e-3, atol=1e-6
+    )

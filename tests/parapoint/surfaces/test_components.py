@@ -91,3 +91,26 @@ def test_the_largest_alone_is_fitted() -> None:
 def test_together_is_one_map_of_all() -> None:
     model = ParaPoint(**TINY).fit(spheres(300, 500))
     assert set(model.points_[:, 0] > 2.5) == {True, False}
+
+
+def test_two_sheets_three_spacings_apart_are_two_components() -> None:
+    # The eight nearest of a point are on its own sheet, within √2 of the spacing, at a corner
+    # within 2 √2; 80 nearest would reach five spacings far.
+    x, y = (of.ravel() for of in np.indices((20, 20)))
+    sheets = [np.stack([x, y, 0 * x + z], axis=1) for z in (0.0, 3.0)]
+    assert cloud_labels(np.concatenate(sheets)).tolist() == [0] * 400 + [1] * 400
+
+
+def test_a_component_of_no_area_is_left_out() -> None:
+    disk = irregular_disk()
+    line = np.array([[5.0, 0, 0], [6, 0, 0], [7, 0, 0]])
+    faces = np.concatenate([disk.faces, [[81, 82, 83]]])
+    (only,) = components(Mesh(np.concatenate([disk.vertices, line]), faces))
+    np.testing.assert_array_equal(only.faces, disk.faces)
+
+
+def test_normals_stay_with_their_points() -> None:
+    points = spheres(500, 300)
+    for part in components(PointCloud(points, -points)):
+        assert part.normals is not None
+        np.testing.assert_array_equal(part.normals, -part.points)

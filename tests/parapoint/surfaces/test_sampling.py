@@ -5,8 +5,15 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from parapoint import Mesh
-from parapoint.surfaces.sampling import even_sample, hull_sample, surface_sample, training_points
+from parapoint import Mesh, PointCloud
+from parapoint.errors import InputError
+from parapoint.surfaces.sampling import (
+    even_sample,
+    hull_sample,
+    mean_spacing,
+    surface_sample,
+    training_points,
+)
 from parapoint.testing import irregular_disk
 
 
@@ -121,16 +128,29 @@ def test_surface_samples_are_uniform_by_area() -> None:
 def test_vertices_beside_another_sheet_make_a_mesh_coarse_from_half_a_percent_on() -> None:
     # Of the three nearest of a vertex under a patch at distance 0.5, the one above is more than two
     # edges off, and so is that of the patch below it; at the patch's ends along y a second one is.
-    # With k × k vertices that is 2 k² + 2 k of 3 (2500 + k²): 1.1 % for k = 6, 0.2 % for k = 2.
+    # With k × k vertices that is 2 k² + 2 k of 3 (2500 + k²): 1.1 % for k = 6, 0.2 % for k = 2. At
+    # distance 1.1 it is the third nearest, after two neighbours at 1: 2 k² of them, 0.9 %.
     sheet = waves()
-    for side, count in ((6, 20_000), (2, 2504)):
+    for side, height, count in ((6, 0.5, 20_000), (2, 0.5, 2504), (6, 1.1, 20_000)):
         corner = (10 * 50 + 10) + np.arange(side)[:, None] * 50 + np.arange(side)
         inside = np.isin(sheet.faces, corner).all(axis=1)
         new = np.full(2500, -1)
         new[corner.ravel()] = 2500 + np.arange(side**2)
-        patch = sheet.vertices[corner.ravel()] + np.array([0, 0, 0.5])
+        patch = sheet.vertices[corner.ravel()] + np.array([0, 0, height])
         both = Mesh(
             np.concatenate([sheet.vertices, patch]),
             np.concatenate([sheet.faces, new[sheet.faces[inside]]]),
         )
         assert len(training_points(both, 20_000, 0)) == count
+
+
+def test_the_spacing_is_the_mean_distance_to_the_nearest_point() -> None:
+    # From 0, 1 and 3 on a line: 1, 1 and 2.
+    assert mean_spacing(np.array([[0.0, 0, 0], [1.0, 0, 0], [3.0, 0, 0]])) == pytest.approx(4 / 3)
+
+
+def test_points_on_a_line_are_refused_and_those_in_a_plane_are_not() -> None:
+    plane = np.pad(np.random.default_rng(0).uniform(size=(150, 2)), ((0, 0), (0, 1)))
+    assert rows(training_points(PointCloud(plane), 200, 0)) == rows(plane)
+    with pytest.raises(InputError, match="on a line"):
+        training_points(PointCloud(plane * [1, 0, 0] + [0, 2, 5]), 200, 0)

@@ -3,7 +3,7 @@ import pymeshlab
 import pytest
 import trimesh
 
-from parapoint.files.surfaces import read_parameterized
+from parapoint.files.reading import read_parameterized
 from reports.contents import contents
 from reports.pictures import exports
 

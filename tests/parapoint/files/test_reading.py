@@ -14,14 +14,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from parapoint import InputError, Mesh, Parameterization, PointCloud
-from parapoint.files import surfaces as files
-from parapoint.files.surfaces import (
-    FORMATS,
-    read_parameterized,
-    read_surface,
-    write_obj,
-    write_points,
-)
+from parapoint.files import point_writers
+from parapoint.files.mesh_writers import write_obj
+from parapoint.files.point_writers import write_points
+from parapoint.files.reading import FORMATS, read_parameterized, read_surface
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
 TRIANGLES = [[0, 1, 2], [0, 2, 3]]
@@ -727,7 +723,7 @@ def test_points_are_written_in_bounded_memory(ending, tmp_path, monkeypatch) -> 
     points = np.random.default_rng(0).normal(size=(20_000, 3))
     cloud, uv = PointCloud(points), points[:, :2].copy()
     write_points(tmp_path / f"whole{ending}", cloud, uv)
-    monkeypatch.setattr(files, "ROWS_WRITTEN", 999)
+    monkeypatch.setattr(point_writers, "ROWS_WRITTEN", 999)
     tracemalloc.start()
     try:
         write_points(tmp_path / f"parts{ending}", cloud, uv)

@@ -1,0 +1,132 @@
+"""What a file holds, and what its readers share: numbers from text, strips, welding."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from parapoint.errors import InputError
+from parapoint.surfaces.surface import FloatArray, IntArray
+
+NO_UV = np.iinfo(np.int64).min
+"""Row of `Content.uv_corners` at a corner without UV."""
+
+
+@dataclass
+class Content:
+    """What a file holds, before it is checked and its polygons are cut into triangles.
+
+    Attributes:
+        vertices: (V, 3) positions.
+        sizes: (N,) number of corners of each polygon.
+        corners: (sum of sizes,) row of `vertices` at each polygon corner.
+        normals: (V, 3) vertex normals, or None.
+        uv: (T, 2) texture coordinates, or None.
+        uv_corners: like `corners`, rows of `uv`; NO_UV where a corner has none.
+        attributes: whatever else is known at each vertex, (V,) or (V, k) by name; see `PointCloud`.
+    """
+
+    vertices: FloatArray
+    sizes: IntArray
+    corners: IntArray
+    normals: FloatArray | None = None
+    uv: FloatArray | None = None
+    uv_corners: IntArray | None = None
+    attributes: dict[str, npt.NDArray[Any]] = field(default_factory=dict)
+
+
+def points_content(
+    points: FloatArray,
+    normals: FloatArray | None = None,
+    attributes: dict[str, npt.NDArray[Any]] | None = None,
+) -> Content:
+    """The content of a file without faces."""
+    none = np.zeros(0, dtype=np.int64)
+    return Content(points, none, none, normals, attributes=attributes or {})
+
+
+def floats(words: Iterable[Any], columns: int) -> FloatArray:
+    """(n, columns) numbers from a flat run of words."""
+    return np.fromiter(map(float, words), dtype=np.float64).reshape(-1, columns)
+
+
+def integers(words: Iterable[Any]) -> IntArray:
+    """(n,) whole numbers from a flat run of words."""
+    return np.fromiter(map(int, words), dtype=np.int64)
+
+
+def ranges(starts: IntArray, sizes: IntArray) -> IntArray:
+    """The numbers start, start + 1, ... of each run, one run after the other."""
+    places = np.arange(int(sizes.sum()), dtype=np.int64)
+    return np.asarray(places + np.repeat(starts - (np.cumsum(sizes) - sizes), sizes))
+
+
+def whole(values: FloatArray | IntArray) -> IntArray:
+    """Indices that were read as numbers of any kind."""
+    if not ((np.abs(values) < 2**53) & (np.floor(values) == values)).all():
+        raise InputError("an index is no whole number")
+    return values.astype(np.int64)
+
+
+def word_counts(text: bytes, line_count: int) -> IntArray:
+    """(line_count,) number of words in each of the lines of a text."""
+    if line_count == 0:
+        return np.zeros(0, dtype=np.int64)
+    characters = np.frombuffer(text, dtype=np.uint8)
+    blank = characters <= 32
+    first = ~blank & np.concatenate([[True], blank[:-1]])
+    line = np.concatenate([[0], np.cumsum(characters == ord("\n"))[:-1]])
+    return np.bincount(line[first], minlength=line_count)
+
+
+def numbers(text: bytes, kind: type[np.float64 | np.int64]) -> npt.NDArray[Any]:
+    """All numbers of a text; fast, since a mesh has a million of them.
+
+    Raises:
+        ValueError: a word is no number; the message names it.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", DeprecationWarning)
+        try:
+            return np.fromstring(text, kind, sep=" ") if text.strip() else np.zeros(0, kind)
+        except (DeprecationWarning, ValueError):  # numpy stops at a word without naming it
+            words = map(float if kind is np.float64 else int, text.split())
+            return np.fromiter(words, dtype=kind)
+
+
+def strip_triangles(sizes: IntArray, corners: IntArray) -> IntArray:
+    """(F, 3) triangles of strips; -1 ends a strip, every second triangle is turned round.
+
+    Triangles with a vertex twice only steer the strip, and are left out.
+    """
+    ends = np.cumsum(sizes)
+    run = np.insert(corners, ends, -1)  # the end of a list ends its strip as well
+    place = np.arange(len(run))
+    begin = np.maximum.accumulate(np.where(run < 0, place, -1)) + 1
+    windows = np.stack([run[:-2], run[1:-1], run[2:]], axis=1)
+    odd = ((place - begin)[:-2] % 2).astype(bool)
+    windows[odd] = windows[odd][:, [1, 0, 2]]
+    a, b, c = windows.T
+    return np.asarray(windows[(windows >= 0).all(axis=1) & (a != b) & (b != c) & (c != a)])
+
+
+def welded(points: FloatArray) -> tuple[FloatArray, IntArray]:
+    """The distinct points in the order in which they first stand, and the row of each point.
+
+    Points are one only where their coordinates are exactly equal; there is no tolerance that
+    would be right for every file.
+    """
+    order = np.lexsort(points.T)
+    ordered = points[order]
+    fresh = np.ones(len(points), dtype=bool)
+    fresh[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    group = np.empty(len(points), dtype=np.int64)
+    group[order] = np.cumsum(fresh) - 1
+    first = order[fresh]  # lexsort is stable: the first of its group in the file
+    rank = np.argsort(np.argsort(first))
+    return points[np.sort(first)], rank[group]

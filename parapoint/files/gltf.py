@@ -1,0 +1,204 @@
+"""glTF 2, as .gltf and .glb: bytes in, `Content` out.
+
+Ours, since trimesh drops the UV of primitives that have no material.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import struct
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from parapoint.errors import InputError
+from parapoint.files.content import (
+    NO_UV,
+    Content,
+    points_content,
+    strip_triangles,
+    welded,
+    whole,
+)
+from parapoint.surfaces.surface import FloatArray, IntArray
+
+GLTF_TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+GLTF_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+
+
+def glb(data: bytes, folder: Path) -> Content:
+    """Binary glTF 2: a header and two chunks, JSON and data."""
+    magic, version, _ = struct.unpack_from("<4sII", data)
+    if magic != b"glTF" or version != 2:
+        raise InputError("is no binary glTF 2 file")
+    length, kind = struct.unpack_from("<I4s", data, 12)
+    if kind != b"JSON":
+        raise InputError("has no JSON chunk")
+    tail = data[20 + length :]
+    chunk = b""
+    if len(tail) >= 8:
+        size, _ = struct.unpack_from("<I4s", tail)
+        chunk = tail[8 : 8 + size]
+    return gltf(data[20 : 20 + length], folder, chunk)
+
+
+def gltf(data: bytes, folder: Path, chunk: bytes = b"") -> Content:
+    """The triangles (or, without any, the points) of a glTF 2 scene, moved to their places.
+
+    glTF splits a vertex wherever a normal or a UV differs, so vertices are welded where their
+    positions are exactly equal: seams of the UV are seams, not boundaries of the mesh. The UV are
+    those of the first set, with v upwards as in OBJ.
+    """
+    return _Gltf(json.loads(data), folder, chunk).content()
+
+
+class _Gltf:
+    """One glTF file while it is read."""
+
+    def __init__(self, tree: Any, folder: Path, chunk: bytes) -> None:
+        if not isinstance(tree, dict) or not tree.get("meshes"):
+            raise InputError("has no mesh")
+        self.tree = tree
+        self.buffers = [self._buffer(item, folder, chunk) for item in tree.get("buffers", [])]
+
+    @staticmethod
+    def _buffer(item: dict[str, Any], folder: Path, chunk: bytes) -> bytes:
+        """The bytes of a buffer: the file's own chunk, in the text, or a file in its folder."""
+        uri = item.get("uri")
+        if uri is None:
+            return chunk
+        if uri.startswith("data:"):
+            return base64.b64decode(uri.partition(",")[2])
+        path = (folder / unquote(uri)).resolve()
+        if not path.is_relative_to(folder.resolve()) or not path.is_file():
+            raise InputError(f"its buffer {uri[:80]!r} is not a file beside it")
+        return path.read_bytes()
+
+    def accessor(self, index: int) -> FloatArray | IntArray:
+        """(n, width) values; normalized whole numbers become fractions."""
+        item = self.tree["accessors"][index]
+        if "sparse" in item or "bufferView" not in item:
+            raise InputError("has sparse or compressed data, which is not read; export it plain")
+        view = self.tree["bufferViews"][item["bufferView"]]
+        kind = np.dtype(GLTF_TYPES[item["componentType"]])
+        width = GLTF_WIDTHS[item["type"]]
+        stride = view.get("byteStride", width * kind.itemsize)
+        start = view.get("byteOffset", 0) + item.get("byteOffset", 0)
+        raw = self.buffers[view["buffer"]]
+        count = item["count"]
+        if count < 1 or start < 0 or stride < width * kind.itemsize:
+            raise InputError("has an accessor of impossible size")
+        if start + (count - 1) * stride + width * kind.itemsize > len(raw):
+            raise InputError("ends early, in a buffer")
+        array = np.ndarray((count, width), kind, raw, start, (stride, kind.itemsize))
+        if kind.kind == "f":
+            return array.astype(np.float64)
+        if item.get("normalized"):
+            return np.maximum(array / float(np.iinfo(kind).max), -1.0)
+        return array.astype(np.int64)
+
+    def placed_primitives(self) -> list[tuple[dict[str, Any], FloatArray]]:
+        """Each primitive of the scene with its (4, 4) transform."""
+        nodes = self.tree.get("nodes", [])
+        if not nodes:
+            return [(p, np.eye(4)) for mesh in self.tree["meshes"] for p in mesh["primitives"]]
+        scenes = self.tree.get("scenes", [])
+        children = {child for node in nodes for child in node.get("children", [])}
+        roots = (
+            scenes[self.tree.get("scene", 0)].get("nodes", [])
+            if scenes
+            else [index for index in range(len(nodes)) if index not in children]
+        )
+        placed = []
+        waiting = [(index, np.eye(4)) for index in reversed(roots)]
+        visited: set[int] = set()  # nodes form trees; a file in which they do not must not hang
+        while waiting:
+            index, outer = waiting.pop()
+            if index in visited:
+                raise InputError("has a node that hangs in two places")
+            visited.add(index)
+            node = nodes[index]
+            transform = outer @ _node_transform(node)
+            if "mesh" in node:
+                primitives = self.tree["meshes"][node["mesh"]]["primitives"]
+                placed += [(primitive, transform) for primitive in primitives]
+            waiting += [(child, transform) for child in reversed(node.get("children", []))]
+        return placed
+
+    def content(self) -> Content:
+        """The scene as one content."""
+        positions, corners, uvs, uv_corners, points = [], [], [], [], []
+        vertex_count = uv_count = 0
+        for primitive, transform in self.placed_primitives():
+            attributes = primitive["attributes"]
+            local = self.accessor(attributes["POSITION"])
+            if not np.isfinite(local).all():
+                raise InputError("has a position that is not finite")
+            place = local @ transform[:3, :3].T + transform[:3, 3]
+            mode = primitive.get("mode", 4)
+            if mode == 0:
+                points.append(place)
+            if mode not in {4, 5, 6}:
+                continue
+            run = (
+                whole(self.accessor(primitive["indices"])).reshape(-1)
+                if "indices" in primitive
+                else np.arange(len(place))
+            )
+            triangles = _mode_triangles(mode, run).reshape(-1)
+            if len(triangles) and (triangles.min() < 0 or triangles.max() >= len(place)):
+                raise InputError(f"a vertex index is out of range (0 to {len(place) - 1})")
+            positions.append(place)
+            corners.append(triangles + vertex_count)
+            vertex_count += len(place)
+            if "TEXCOORD_0" in attributes:
+                uv = np.asarray(self.accessor(attributes["TEXCOORD_0"]), dtype=np.float64)
+                if len(uv) != len(place):
+                    raise InputError(f"{len(uv)} UV for {len(place)} vertices")
+                uvs.append(np.stack([uv[:, 0], 1 - uv[:, 1]], axis=1))
+                uv_corners.append(triangles + uv_count)
+                uv_count += len(uv)
+            else:
+                uv_corners.append(np.full(len(triangles), NO_UV))
+        if not corners:
+            if points:
+                return points_content(np.concatenate(points))
+            raise InputError("has no triangle and no point")
+        vertices, row = welded(np.concatenate(positions))
+        flat = np.concatenate(corners)
+        content = Content(vertices, np.full(len(flat) // 3, 3), row[flat])
+        if uvs:
+            content.uv, content.uv_corners = np.concatenate(uvs), np.concatenate(uv_corners)
+        return content
+
+
+def _node_transform(node: dict[str, Any]) -> FloatArray:
+    """(4, 4) transform of a glTF node: its matrix, or translation, rotation and scale."""
+    if "matrix" in node:
+        matrix = np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
+        if not np.isfinite(matrix).all():
+            raise InputError("has a transform that is not finite")
+        return matrix
+    turn = np.array(node.get("rotation", (0, 0, 0, 1)), dtype=np.float64)
+    stretch = np.array(node.get("scale", (1, 1, 1)), dtype=np.float64)
+    transform = np.eye(4)
+    shift = np.array(node.get("translation", (0, 0, 0)), dtype=np.float64)
+    if not np.isfinite(np.concatenate([turn, stretch, shift])).all():
+        raise InputError("has a transform that is not finite")
+    transform[:3, :3] = Rotation.from_quat(turn).as_matrix() * stretch
+    transform[:3, 3] = shift
+    return transform
+
+
+def _mode_triangles(mode: int, run: IntArray) -> IntArray:
+    """(F, 3) triangles of a glTF primitive: mode 4 a list, 5 a strip, 6 a fan."""
+    if mode == 4:
+        return run.reshape(-1, 3)
+    if mode == 5:
+        return strip_triangles(np.array([len(run)]), run)
+    return np.array([(run[0], *pair) for pair in pairwise(run[1:])], np.int64).reshape(-1, 3)

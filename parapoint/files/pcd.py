@@ -1,0 +1,133 @@
+"""PCD of the Point Cloud Library: bytes in, `Content` without faces out.
+
+Ours: the packages that read the format bring a validation framework and a compiled LZF module for
+what is a header and a table.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from parapoint.errors import InputError
+from parapoint.files.attributes import named_attributes
+from parapoint.files.content import Content, points_content
+from parapoint.files.xyz import table, text_lines
+
+PACKED = {"rgb": 3, "rgba": 4}
+"""Fields that hold the bytes blue, green, red (and alpha) of a colour, and how many count."""
+PCD_NORMALS = ("normal_x", "normal_y", "normal_z")
+
+
+def pcd(data: bytes) -> Content:
+    """PCD of the Point Cloud Library: ascii, binary and binary_compressed."""
+    fields, kinds, counts, count, encoding, body = _pcd_header(data)
+    if not {"x", "y", "z"} <= set(fields):
+        raise InputError("has no fields x, y and z")
+    if any(counts[fields.index(axis)] != 1 for axis in "xyz"):
+        raise InputError("has more than one value in a coordinate field")
+    widths = [kind.itemsize * n for kind, n in zip(kinds, counts, strict=True)]
+    offsets = np.cumsum([0, *widths]).tolist()
+    size = count * sum(widths)
+    wanted = [k for k, name in enumerate(fields) if counts[k] == 1 and name != "_"]
+    if encoding == "ascii":
+        places = np.cumsum([0, *counts]).tolist()
+        values = table(text_lines(body)[:count], tuple(places[k] for k in wanted))
+        if len(values) != count:
+            raise InputError(f"ends early: {count} points are announced, {len(values)} follow")
+        columns = {
+            fields[k]: values[:, at].astype(kinds[k] if fields[k] in PACKED else np.float64)
+            for at, k in enumerate(wanted)
+        }
+    else:
+        strides = [sum(widths)] * len(kinds)
+        if encoding == "binary_compressed":
+            packed, unpacked = struct.unpack_from("<II", body)
+            if unpacked != size:
+                raise InputError(f"holds {unpacked} bytes for {count} points of {size} bytes")
+            body = lzf_decompressed(body[8 : 8 + packed], size)
+            offsets = [count * offset for offset in offsets]  # one field after the other
+            strides = [kind.itemsize for kind in kinds]
+        if len(body) < size:
+            raise InputError(f"ends early: {count} points take {size} bytes")
+        columns = {
+            fields[k]: np.ndarray((count,), kinds[k], body, offsets[k], (strides[k],)).copy()
+            for k in wanted
+        }
+    points = np.stack([columns.pop(axis) for axis in "xyz"], axis=1).astype(np.float64)
+    normals = None
+    if set(PCD_NORMALS) <= set(columns):
+        normals = np.stack([columns.pop(name) for name in PCD_NORMALS], axis=1).astype(np.float64)
+    return points_content(points, normals, _pcd_attributes(columns))
+
+
+def _pcd_attributes(columns: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
+    """Attributes of PCD fields, packed colours unpacked."""
+    attributes = {}
+    for name, parts in PACKED.items():
+        if name in columns and columns[name].dtype.itemsize == 4:
+            four = np.ascontiguousarray(columns.pop(name)).view(np.uint8).reshape(-1, 4)
+            colours = four[:, [2, 1, 0, 3][:parts]]
+            # Many writers leave alpha at 0 throughout, and mean opaque.
+            attributes["colours"] = colours[:, :3] if not four[:, 3].any() else colours
+    return attributes | named_attributes(columns)
+
+
+def _pcd_header(
+    data: bytes,
+) -> tuple[list[str], list[np.dtype[np.generic]], list[int], int, str, bytes]:
+    """Field names, types and counts, number of points, encoding, and the bytes behind."""
+    header: dict[str, list[str]] = {}
+    rest = data
+    while "DATA" not in header:
+        line, newline, rest = rest.partition(b"\n")
+        words = line.decode("latin-1").split()
+        if words and not words[0].startswith("#"):
+            header[words[0].upper()] = words[1:]
+        if not newline:
+            raise InputError("has no PCD header")
+    fields = header["FIELDS"]
+    codes = {"F": "f", "I": "i", "U": "u"}
+    kinds = [
+        np.dtype(f"<{codes[kind]}{int(size)}")
+        for kind, size in zip(header["TYPE"], header["SIZE"], strict=True)
+    ]
+    counts = [int(word) for word in header.get("COUNT", ["1"] * len(fields))]
+    if not len(fields) == len(kinds) == len(counts) or min(counts, default=0) < 1:
+        raise InputError("has a header whose FIELDS, SIZE, TYPE and COUNT do not agree")
+    count = int(header["POINTS"][0])
+    encoding = header["DATA"][0].lower()
+    if count < 0 or encoding not in {"ascii", "binary", "binary_compressed"}:
+        raise InputError(f"has {count} points in encoding {encoding[:30]!r}, which is not read")
+    return fields, kinds, counts, count, encoding, rest
+
+
+def lzf_decompressed(data: bytes, size: int) -> bytes:
+    """`size` bytes from Marc Lehmann's LZF format: literal runs and copies of earlier bytes."""
+    out = bytearray()
+    at = 0
+    while at < len(data) and len(out) <= size:
+        control = data[at]
+        at += 1
+        if control < 32:
+            out += data[at : at + control + 1]
+            at += control + 1
+            continue
+        length = control >> 5
+        if length == 7:
+            length += data[at]
+            at += 1
+        length += 2
+        distance = ((control & 31) << 8) + data[at] + 1
+        at += 1
+        start = len(out) - distance
+        if start < 0:
+            raise InputError("has broken compressed data")
+        copied = out[start : start + length]
+        out += (copied * (length // len(copied) + 1))[:length]  # a copy may overlap itself
+    if len(out) != size:
+        raise InputError(f"has broken compressed data: {len(out)} bytes where {size} belong")
+    return bytes(out)

@@ -1,0 +1,213 @@
+"""PLY, text and binary: bytes in, `Content` out.
+
+Ours, since trimesh takes PLY triangle strips for points and mixed binary polygons for garbage.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from parapoint.errors import InputError
+from parapoint.files.attributes import GEOMETRY, named_attributes
+from parapoint.files.content import Content, floats, integers, ranges, strip_triangles, whole
+from parapoint.surfaces.surface import FloatArray, IntArray
+
+PLY_TYPES = {
+    **dict.fromkeys(("char", "int8"), "i1"),
+    **dict.fromkeys(("uchar", "uint8"), "u1"),
+    **dict.fromkeys(("short", "int16"), "i2"),
+    **dict.fromkeys(("ushort", "uint16"), "u2"),
+    **dict.fromkeys(("int", "int32"), "i4"),
+    **dict.fromkeys(("uint", "uint32"), "u4"),
+    **dict.fromkeys(("float", "float32"), "f4"),
+    **dict.fromkeys(("double", "float64"), "f8"),
+}
+
+
+@dataclass
+class _Property:
+    """A scalar of a PLY element, or a list where `count_type` is given (numpy type codes)."""
+
+    name: str
+    type: np.dtype[Any]
+    count_type: np.dtype[Any] | None
+
+
+@dataclass
+class _Body:
+    """The data of a PLY file: bytes, or the numbers of a text file, where each is one unit wide."""
+
+    raw: bytes
+    numbers: FloatArray | None
+
+    @property
+    def size(self) -> int:
+        """Length in units."""
+        return len(self.raw) if self.numbers is None else len(self.numbers)
+
+    def width(self, kind: np.dtype[Any]) -> int:
+        """Units of one value."""
+        return kind.itemsize if self.numbers is None else 1
+
+    def values(self, at: IntArray, kind: np.dtype[Any]) -> FloatArray:
+        """The values that start at these units."""
+        if self.numbers is not None:
+            return np.asarray(self.numbers[at], dtype=np.float64)
+        pool = np.frombuffer(self.raw, dtype=np.uint8)
+        chosen = pool[at[:, None] + np.arange(kind.itemsize)]
+        return np.asarray(chosen.view(kind).reshape(-1), dtype=np.float64)
+
+    def count_at(self, kind: np.dtype[Any]) -> Callable[[int], int]:
+        """A function that reads a list's length at a unit."""
+        if self.numbers is not None:
+            numbers = self.numbers
+            return lambda at: int(numbers[at])
+        code = struct.Struct(kind.byteorder.replace("|", "=").replace("=", "<") + kind.char)
+        return lambda at: int(code.unpack_from(self.raw, at)[0])
+
+
+def ply(data: bytes) -> Content:
+    """PLY, text or binary of either byte order: polygons and triangle strips, vertex normals."""
+    match = re.match(rb"ply\s*?\r?\n(.*?)end_header[ \t]*\r?\n", data, re.DOTALL)
+    if match is None:
+        raise InputError("has no PLY header")
+    encoding, elements = _ply_header(match[1].decode("latin-1").splitlines())
+    raw = data[match.end() :]
+    body = _Body(raw, None if encoding else floats(raw.split(), 1).reshape(-1))
+    at = 0
+    columns: dict[str, npt.NDArray[Any]] = {}
+    sizes = corners = np.zeros(0, dtype=np.int64)
+    for name, count, properties in elements:
+        if name == "vertex":
+            columns, at = _ply_table(body, at, count, properties)
+        else:
+            sizes_here, corners_here, at = _ply_lists(body, at, count, properties)
+            if name == "face":
+                sizes, corners = sizes_here, corners_here
+            elif name == "tristrips":
+                triangles = strip_triangles(sizes_here, corners_here)
+                sizes, corners = np.full(len(triangles), 3), triangles.reshape(-1)
+    if not all(axis in columns for axis in "xyz"):
+        raise InputError("has no vertex element with x, y and z")
+    vertices = _stacked(columns, "x", "y", "z")
+    normals = None
+    if all(axis in columns for axis in ("nx", "ny", "nz")):
+        normals = _stacked(columns, "nx", "ny", "nz")
+    return Content(vertices, sizes, corners, normals, attributes=named_attributes(columns))
+
+
+def _stacked(columns: dict[str, npt.NDArray[Any]], *names: str) -> FloatArray:
+    """(n, 3) of three columns."""
+    return np.stack([columns[name] for name in names], axis=1, dtype=np.float64, casting="unsafe")
+
+
+def _ply_header(lines: list[str]) -> tuple[str, list[tuple[str, int, list[_Property]]]]:
+    """The byte order ("" for text, "<" or ">"), and name, count and properties of each element."""
+    encoding = ""
+    elements: list[tuple[str, int, list[_Property]]] = []
+    for line in lines:
+        words = line.split()
+        match words:
+            case ["format", kind, *_]:
+                orders = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+                encoding = orders[kind]
+            case ["element", name, count]:
+                elements.append((name, int(count), []))
+            case ["property", "list", count_kind, kind, name]:
+                elements[-1][2].append(
+                    _Property(
+                        name,
+                        np.dtype(encoding + PLY_TYPES[kind]),
+                        np.dtype(encoding + PLY_TYPES[count_kind]),
+                    )
+                )
+            case ["property", kind, name]:
+                elements[-1][2].append(_Property(name, np.dtype(encoding + PLY_TYPES[kind]), None))
+            case ["comment" | "obj_info", *_] | []:
+                pass
+            case _:
+                raise InputError(f"has an unknown header line {line[:60]!r}")
+    if any(count < 0 for _, count, _ in elements):
+        raise InputError("has a negative element count")
+    return encoding, elements
+
+
+def _ply_table(
+    body: _Body, at: int, count: int, properties: list[_Property]
+) -> tuple[dict[str, npt.NDArray[Any]], int]:
+    """Columns of an element without lists, by property name, and the unit behind it."""
+    if any(item.count_type is not None for item in properties):
+        raise InputError("has lists among its vertex properties, which is not read")
+    if not properties:
+        return {}, at
+    width = sum(body.width(item.type) for item in properties)
+    end = at + count * width
+    if end > body.size:
+        raise InputError(f"ends early: {count} vertices are announced")
+    if body.numbers is not None:
+        rows = body.numbers[at:end].reshape(count, width)
+        return {
+            item.name: rows[:, k].astype(item.type if item.name not in GEOMETRY else np.float64)
+            for k, item in enumerate(properties)
+        }, end
+    kind = np.dtype([(f"{k}", item.type) for k, item in enumerate(properties)])
+    table = np.frombuffer(body.raw, kind, count, at)
+    return {
+        item.name: table[f"{k}"].astype(item.type.newbyteorder("="))
+        for k, item in enumerate(properties)
+    }, end
+
+
+def _ply_lists(
+    body: _Body, at: int, count: int, properties: list[_Property]
+) -> tuple[IntArray, IntArray, int]:
+    """Lengths and values of an element's vertex index list, and the unit behind the element."""
+    none = np.zeros(0, dtype=np.int64)
+    if all(item.count_type is None for item in properties):
+        return none, none, at + count * sum(body.width(item.type) for item in properties)
+    steps: list[tuple[int, int, int, Callable[[int], int] | None, bool]] = []
+    index_type = np.dtype("i4")
+    for item in properties:
+        if item.count_type is None:
+            steps.append((body.width(item.type), 0, 0, None, False))
+            continue
+        wanted = item.name in {"vertex_indices", "vertex_index"}
+        if wanted:
+            index_type = item.type
+        steps.append(
+            (
+                0,
+                body.width(item.count_type),
+                body.width(item.type),
+                body.count_at(item.count_type),
+                wanted,
+            )
+        )
+    sizes: list[int] = []
+    starts: list[int] = []
+    for _ in range(count):
+        for skip, count_width, width, count_at, wanted in steps:
+            if count_at is None:
+                at += skip
+                continue
+            size = count_at(at)
+            at += count_width
+            if size < 0:
+                raise InputError("has a list of negative length")
+            if wanted:
+                sizes.append(size)
+                starts.append(at)
+            at += size * width
+        if at > body.size:
+            raise InputError("ends early, in a list")
+    run = integers(sizes)
+    width = body.width(index_type)
+    places = np.repeat(integers(starts), run) + width * ranges(np.zeros_like(run), run)
+    return run, whole(body.values(places, index_type)), at

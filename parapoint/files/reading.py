@@ -1,0 +1,217 @@
+"""Surfaces and maps from files.
+
+Vertices and faces keep the order of the file (STL and glTF, which repeat vertices, are welded).
+Every fault of a file is one InputError that names it: each reader of bytes may raise InputError,
+ValueError, IndexError, KeyError, OverflowError, struct.error or TypeError on bytes that are no
+such file.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from parapoint.errors import InputError
+from parapoint.files.content import NO_UV, Content
+from parapoint.files.gltf import glb, gltf
+from parapoint.files.las import las
+from parapoint.files.obj import obj
+from parapoint.files.off import off
+from parapoint.files.pcd import pcd
+from parapoint.files.ply import ply
+from parapoint.files.polygons import triangle_rows
+from parapoint.files.stl import stl
+from parapoint.files.xyz import pts, xyz
+from parapoint.surfaces.parameterization import Parameterization
+from parapoint.surfaces.surface import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    Mesh,
+    PointCloud,
+    Surface,
+    read_only,
+)
+
+FORMATS: dict[str, Callable[[bytes, Path], Content]] = {
+    ".obj": lambda data, _: obj(data),
+    ".ply": lambda data, _: ply(data),
+    ".off": lambda data, _: off(data),
+    ".stl": lambda data, _: stl(data),
+    ".glb": glb,
+    ".gltf": gltf,
+    ".xyz": lambda data, _: xyz(data),
+    ".pts": lambda data, _: pts(data),
+    ".pcd": lambda data, _: pcd(data),
+    ".las": lambda data, _: las(data),
+    ".laz": lambda data, _: las(data),
+}
+"""Reader of each file name ending; it gets the bytes and the folder of the file."""
+
+UV_FORMATS = (".obj", ".glb", ".gltf")
+
+logger = logging.getLogger("parapoint")
+
+
+def read_surface(path: str | Path) -> Surface:
+    """The surface in a file: a Mesh, or a PointCloud where the file has no faces.
+
+    Polygons become triangles in place: a quad is cut along its first diagonal, or along the
+    second if it would fold along the first; larger polygons are fanned from their first corner.
+    STL repeats each vertex in each triangle: equal ones are welded, so that the mesh is connected.
+    Points with a NaN or infinite coordinate are dropped with a logged warning, vertices are not.
+
+    Raises:
+        InputError: there is no such file, its ending is unknown, or it cannot be read; coordinates
+            of a mesh are not finite or an index is out of range; no point of a cloud is finite.
+    """
+    path = Path(path)
+    with faults_of(path):
+        content = _content(path)
+        return _mesh(content)[0] if len(content.sizes) else _point_cloud(content, path)
+
+
+def read_parameterized(path: str | Path) -> tuple[Mesh, Parameterization]:
+    """The mesh in an OBJ (with vt) or glTF file, and the UV map that it carries.
+
+    Rows of `uv` are the file's, but for two habits of exporters, so that a seam is a place where
+    the map is cut. Where several rows hold the same UV for the same vertex, all corners use the
+    first. A row that serves several places of the surface, as where each UV is written once
+    and charts lie over each other, is repeated at the end, once for each further place.
+
+    Raises:
+        InputError: as for `read_surface`; the format carries no UV, the file has none or not for
+            all faces; a UV is not finite or its index is out of range.
+    """
+    path = Path(path)
+    with faults_of(path):
+        if path.suffix.lower() in FORMATS and path.suffix.lower() not in UV_FORMATS:
+            raise InputError("this format carries no UV map; give an OBJ with vt lines, or GLB")
+        content = _content(path)
+        if len(content.sizes) == 0:
+            raise InputError("has no faces; a UV map needs a mesh")
+        if content.uv is None or content.uv_corners is None:
+            raise InputError("has no UV coordinates")
+        mesh, rows = _mesh(content)
+        corners = content.uv_corners[rows]
+        bare = (corners == NO_UV).any(axis=1)
+        if bare.any():
+            raise InputError(
+                f"{int(bare.sum())} of {len(bare)} triangles have no UV; each must have one"
+            )
+        outside = (corners < 0) | (corners >= len(content.uv))
+        if outside.any():
+            raise InputError(
+                f"triangle {int(np.flatnonzero(outside.any(axis=1))[0])} has a UV index out of "
+                f"range; the file has {len(content.uv)} UV coordinates"
+            )
+        uv = read_only(content.uv, np.float64, "uv", 2)
+        corners = _shared_corners(mesh, uv, corners)
+        return mesh, Parameterization(*_rows_of_one_place(mesh, uv, corners))
+
+
+@contextmanager
+def faults_of(path: Path) -> Iterator[None]:
+    """Whatever is wrong with a file while it is read becomes one InputError line that names it."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    except MemoryError:
+        raise InputError(f"{path}: is too large for the memory of this machine") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except Exception as error:
+        kind = path.suffix.lstrip(".").upper()
+        detail = " ".join(str(error).split())[:200] or type(error).__name__
+        raise InputError(f"{path}: is no {kind} file that can be read ({detail})") from error
+
+
+def _content(path: Path) -> Content:
+    """What the file holds, by the reader of its ending."""
+    reader = FORMATS.get(path.suffix.lower())
+    if path.is_dir():
+        raise InputError("is a folder, not a file")
+    if not path.exists():
+        raise InputError("no such file")
+    if reader is None:
+        raise InputError(f"has an unknown ending; known are {', '.join(FORMATS)}")
+    if not path.is_file():
+        raise InputError("is not a regular file")
+    data = path.read_bytes()
+    if not data.strip():
+        raise InputError("is empty")
+    return reader(data, path.parent)
+
+
+def _mesh(content: Content) -> tuple[Mesh, IntArray]:
+    """The triangle mesh, and for each triangle corner its place (F, 3) among polygon corners."""
+    small = content.sizes < 3
+    if small.any():
+        face = int(np.flatnonzero(small)[0])
+        raise InputError(f"face {face} has {int(content.sizes[face])} corners; it needs three")
+    vertices = read_only(content.vertices, np.float64, "vertices", 3)
+    outside = (content.corners < 0) | (content.corners >= len(vertices))
+    if outside.any():
+        corner = int(np.flatnonzero(outside)[0])
+        face = int(np.searchsorted(np.cumsum(content.sizes), corner, side="right"))
+        raise InputError(
+            f"face {face} has a vertex index out of range; the file has {len(vertices)} vertices"
+        )
+    rows = triangle_rows(vertices, content.sizes, content.corners)
+    return Mesh(vertices, content.corners[rows]), rows
+
+
+def _shared_corners(mesh: Mesh, uv: FloatArray, corners: IntArray) -> IntArray:
+    """`corners` with the first of all rows that hold the same UV for the same vertex."""
+    flat = corners.reshape(-1)
+    order = np.lexsort((flat, uv[flat, 1], uv[flat, 0], mesh.faces.reshape(-1)))
+    keys = np.column_stack([mesh.faces.reshape(-1), uv[flat]])[order]
+    fresh = np.ones(len(flat), dtype=bool)
+    fresh[1:] = (keys[1:] != keys[:-1]).any(axis=1)
+    shared = np.empty_like(flat)
+    shared[order] = flat[order][fresh][np.cumsum(fresh) - 1]
+    return shared.reshape(-1, 3)
+
+
+def _rows_of_one_place(
+    mesh: Mesh, uv: FloatArray, corners: IntArray
+) -> tuple[FloatArray, IntArray]:
+    """`uv` and `corners` with a further row for each further place that a row serves."""
+    row, position = corners.reshape(-1), mesh.vertices[mesh.faces.reshape(-1)]
+    served = np.zeros((len(uv), 3))
+    served[row] = position
+    if np.array_equal(served[row], position):
+        return uv, corners
+    _, place = np.unique(position, axis=0, return_inverse=True)
+    pairs, pair = np.unique(np.stack([row, place.reshape(-1)], axis=1), axis=0, return_inverse=True)
+    again = np.zeros(len(pairs), dtype=bool)
+    again[1:] = pairs[1:, 0] == pairs[:-1, 0]
+    new_row = np.where(again, len(uv) + np.cumsum(again) - 1, pairs[:, 0])
+    return np.concatenate([uv, uv[pairs[again, 0]]]), new_row[pair.reshape(-1)].reshape(-1, 3)
+
+
+def _point_cloud(content: Content, path: Path) -> PointCloud:
+    """The finite points, with normals where all of them have one."""
+    finite: BoolArray = np.asarray(np.isfinite(content.vertices).all(axis=1))
+    if not finite.any():
+        raise InputError(
+            "has no point" if len(finite) == 0 else "has no point with finite coordinates"
+        )
+    if not finite.all():
+        logger.warning(
+            "%s: %d of %d points dropped: their coordinates are not finite",
+            path,
+            int((~finite).sum()),
+            len(finite),
+        )
+    normals = None if content.normals is None else content.normals[finite]
+    if normals is not None and not np.isfinite(normals).all():
+        logger.warning("%s: normals left out: some are not finite", path)
+        normals = None
+    attributes = {name: values[finite] for name, values in content.attributes.items()}
+    return PointCloud(content.vertices[finite], normals, int((~finite).sum()), attributes)

@@ -1,0 +1,23 @@
+"""STL, text and binary, by trimesh: bytes in, `Content` out."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+
+from parapoint.errors import InputError
+from parapoint.files.content import Content, welded
+
+
+def stl(data: bytes) -> Content:
+    """STL, text or binary: a soup of triangles, whose corners are welded where they are equal."""
+    from trimesh.exchange.stl import load_stl
+
+    parts = load_stl(io.BytesIO(data))
+    solids = list(parts["geometry"].values()) if "geometry" in parts else [parts]
+    soup = [np.asarray(solid["vertices"])[solid["faces"]].reshape(-1, 3) for solid in solids]
+    if not any(map(len, soup)):
+        raise InputError("has no triangle")
+    vertices, corners = welded(np.concatenate(soup).astype(np.float64))
+    return Content(vertices, np.full(len(corners) // 3, 3), corners)

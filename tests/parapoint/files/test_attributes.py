@@ -1,0 +1,163 @@
+"""What is known at each point beside its place: read by type, kept in order, written back."""
+
+import struct
+
+import laspy
+import numpy as np
+import pytest
+
+from parapoint import InputError, PointCloud
+from parapoint.files.point_writers import write_points
+from parapoint.files.reading import read_surface
+
+POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+RGB = np.array([[255, 0, 0], [0, 128, 0], [1, 2, 3], [9, 8, 7]], dtype=np.uint8)
+
+
+def read(path, content: bytes | str) -> PointCloud:
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    surface = read_surface(path)
+    assert isinstance(surface, PointCloud)
+    return surface
+
+
+def lines(*columns) -> str:
+    return "".join(" ".join(map(repr, row)) + "\n" for row in np.hstack(columns).tolist())
+
+
+@pytest.mark.parametrize("text", [True, False])
+def test_ply_colours_and_scalars_keep_their_types(text, tmp_path) -> None:
+    header = "ply\nformat {} 1.0\nelement vertex 4\n" + "".join(
+        f"property {kind} {name}\n"
+        for kind, name in [
+            *(("float", axis) for axis in "xyz"),
+            *(("uchar", name) for name in ("red", "green", "blue")),
+            ("short", "scalar_Intensity"),
+            ("float", "quality"),
+        ]
+    )
+    kind = np.dtype([("p", "<f4", 3), ("c", "u1", 3), ("i", "<i2"), ("q", "<f4")])
+    table = np.zeros(4, kind)
+    table["p"], table["c"], table["i"], table["q"] = POINTS, RGB, [-5, 6, 7, 8], 0.5
+    if text:
+        body = "".join(
+            f"{x} {y} {z} {r} {g} {b} {i} {q}\n" for (x, y, z), (r, g, b), i, q in table.tolist()
+        )
+        cloud = read(tmp_path / "a.ply", header.format("ascii") + "end_header\n" + body)
+    else:
+        head = header.format("binary_little_endian") + "end_header\n"
+        cloud = read(tmp_path / "a.ply", head.encode() + table.tobytes())
+    assert np.array_equal(cloud.points, POINTS)
+    assert list(cloud.attributes) == ["colours", "intensity", "quality"]
+    assert cloud.attributes["colours"].dtype == np.uint8
+    assert np.array_equal(cloud.attributes["colours"], RGB)
+    assert cloud.attributes["intensity"].dtype == np.int16
+    assert cloud.attributes["intensity"].tolist() == [-5, 6, 7, 8]
+    assert cloud.attributes["quality"].dtype == np.float32
+
+
+@pytest.mark.parametrize("packed", ["F", "U"])
+@pytest.mark.parametrize("encoding", ["ascii", "binary"])
+def test_pcd_colours_are_unpacked(packed, encoding, tmp_path) -> None:
+    code = (RGB.astype(np.uint32) << np.array([16, 8, 0], dtype=np.uint32)).sum(axis=1)
+    code = code.astype(np.uint32)
+    written = code.view(np.float32) if packed == "F" else code
+    header = (
+        f"VERSION 0.7\nFIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F {packed}\nCOUNT 1 1 1 1\n"
+        f"WIDTH 4\nHEIGHT 1\nPOINTS 4\nDATA {encoding}\n"
+    )
+    if encoding == "ascii":
+        body = "".join(
+            f"{x} {y} {z} {value}\n"
+            for (x, y, z), value in zip(POINTS, map(str, written), strict=True)
+        ).encode()
+    else:
+        pairs = zip(POINTS.astype("<f4"), code, strict=True)
+        body = b"".join(place.tobytes() + struct.pack("<I", value) for place, value in pairs)
+    cloud = read(tmp_path / "a.pcd", header.encode() + body)
+    assert np.array_equal(cloud.attributes["colours"], RGB)
+
+
+@pytest.mark.parametrize(("scale", "kind"), [(1, np.uint8), (257, np.uint16)])
+def test_las_colours_are_of_8_or_16_bits(scale, kind, tmp_path) -> None:
+    file = laspy.create(point_format=2, file_version="1.2")
+    file.x, file.y, file.z = POINTS.T
+    file.red, file.green, file.blue = (RGB.astype(np.uint16) * scale).T
+    file.intensity = [1, 2, 3, 400]
+    file.write(tmp_path / "a.las")
+    cloud = read_surface(tmp_path / "a.las")
+    assert cloud.attributes["colours"].dtype == kind
+    assert np.array_equal(cloud.attributes["colours"], RGB.astype(kind) * kind(scale))
+    assert cloud.attributes["intensity"].tolist() == [1, 2, 3, 400]
+
+
+def test_las_without_colours_has_none(tmp_path) -> None:
+    file = laspy.create(point_format=2, file_version="1.2")
+    file.x, file.y, file.z = POINTS.T
+    file.write(tmp_path / "a.las")
+    assert "colours" not in read_surface(tmp_path / "a.las").attributes
+
+
+def test_columns_of_text_are_told_apart(tmp_path) -> None:
+    strength = np.array([[0.5], [7.25], [-3.0], [1e3]])
+    unit = POINTS[[1, 2, 3, 1]]
+    cloud = read(tmp_path / "a.pts", "4\n" + lines(POINTS, strength, RGB))
+    assert cloud.normals is None
+    assert np.array_equal(cloud.attributes["intensity"], strength[:, 0])
+    assert np.array_equal(cloud.attributes["colours"], RGB)
+    assert cloud.attributes["colours"].dtype == np.uint8
+    cloud = read(tmp_path / "a.xyz", lines(POINTS, RGB, unit))
+    assert np.array_equal(cloud.normals, unit)
+    assert np.array_equal(cloud.attributes["colours"], RGB)
+    cloud = read(tmp_path / "b.xyz", lines(POINTS, unit, RGB / 255))
+    assert np.array_equal(cloud.normals, unit)
+    assert np.array_equal(cloud.attributes["colours"], RGB / 255)
+    cloud = read(tmp_path / "c.xyz", lines(POINTS, 500.5 + POINTS))
+    assert cloud.normals is None
+    assert list(cloud.attributes) == ["column4", "column5", "column6"]
+
+
+def test_columns_that_are_no_numbers_are_left(tmp_path) -> None:
+    cloud = read(tmp_path / "a.xyz", "0 0 0 tree\n1 0 0 stone\n")
+    assert cloud.points.tolist() == [[0, 0, 0], [1, 0, 0]]
+    assert not cloud.attributes
+
+
+def test_dropped_points_take_their_attributes_along(tmp_path) -> None:
+    cloud = read(tmp_path / "a.xyz", "0 0 0 1\nnan 0 0 2\n1 0 0 3\n")
+    assert cloud.attributes["intensity"].tolist() == [1, 3]
+
+
+@pytest.mark.parametrize("ending", [".ply", ".npz", ".obj"])
+def test_attributes_are_written_beside_the_uv(ending, tmp_path) -> None:
+    attributes = {"colours": RGB, "intensity": np.arange(4, dtype=np.uint16), "flow": POINTS[:, :2]}
+    path = tmp_path / f"a{ending}"
+    write_points(path, PointCloud(POINTS, attributes=attributes), POINTS[:, :2])
+    if ending == ".obj":
+        assert path.read_text().splitlines()[0] == "v 0.0 0.0 0.0 1.0 0.0 0.0"
+    elif ending == ".npz":
+        with np.load(path) as written:
+            assert all(np.array_equal(written[name], of) for name, of in attributes.items())
+    else:
+        cloud = read_surface(path)
+        assert np.array_equal(cloud.attributes["colours"], RGB)
+        assert cloud.attributes["intensity"].dtype == np.uint16
+        assert np.array_equal(cloud.attributes["flow_1"], POINTS[:, 1])
+        assert np.array_equal(cloud.attributes["u"], POINTS[:, 0])
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "message"),
+    [
+        ("colours", RGB[:3], "3 colours for 4 points"),
+        ("colours", RGB[:, :2], "colours must have shape"),
+        ("colours", RGB.astype(np.int64), "colours must be uint8, uint16 or floats"),
+        ("colours", RGB / 200, "must lie between 0 and 1"),
+        ("colours", np.full((4, 3), np.nan), "must lie between 0 and 1"),
+        ("intensity", np.zeros(5), "5 intensity for 4 points"),
+        ("label", np.array(["a"] * 4), "label must be numbers"),
+    ],
+)
+def test_attributes_that_do_not_fit_are_refused(name, values, message) -> None:
+    with pytest.raises(InputError, match=message.replace("(", r"\(")):
+        PointCloud(POINTS, attributes={name: values})

@@ -1,0 +1,82 @@
+"""Which edges span a seam, and what becomes of their faces, on grids whose answers are known."""
+
+import numpy as np
+import pytest
+
+from parapoint.surfaces.spanning import learned_seam, opened, spanning_edges
+from parapoint.surfaces.surface import Mesh
+
+
+def grid(columns: int, rows: int) -> Mesh:
+    """Vertices at whole x and y, x by x, in squares whose diagonals go up to the right."""
+    x, y = (of.ravel() for of in np.indices((columns, rows)))
+    a = (rows * np.arange(columns - 1)[:, None] + np.arange(rows - 1)).ravel()
+    b, c, d = a + rows, a + rows + 1, a + 1
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return Mesh(np.stack([x, y, 0 * x], axis=1), faces)
+
+
+@pytest.mark.parametrize(
+    ("columns", "shift", "is_spanned"),
+    [
+        (101, 4.5, True),  # 5.5 times as long as it was, and 5 % of the box
+        (101, 3.5, False),  # 4.5 times: that may be the map
+        (1001, 4.5, False),  # 0.5 % of the box: too short to see
+    ],
+)
+def test_a_spanning_edge_is_five_times_its_length_and_a_hundredth_of_the_box(
+    columns: int, shift: float, is_spanned: bool
+) -> None:
+    # What is right of the middle is moved to the right. A diagonal across becomes √(1 + 5.5²) / √2,
+    # less than 4 times as long, so three straight edges may span.
+    mesh = grid(columns, 3)
+    uv = mesh.vertices[:, :2] + [shift, 0] * (mesh.vertices[:, :1] > 50)
+    ends = mesh.vertices[mesh.edges]
+    across = (ends[:, :, 0].sum(axis=1) == 101) & (ends[:, 0, 1] == ends[:, 1, 1])
+    assert across.sum() == 3
+    assert np.array_equal(spanning_edges(mesh, uv), across & is_spanned)
+
+
+def test_one_calm_end_is_enough() -> None:
+    # One vertex is moved away: all its six edges are long, but the other ends have calm ones.
+    mesh = grid(9, 9)
+    uv = mesh.vertices[:, :2].copy()
+    uv[40] += [30, 10]
+    assert np.array_equal(spanning_edges(mesh, uv), (mesh.edges == 40).any(axis=1))
+
+
+def test_a_third_of_the_edges_makes_an_end_calm() -> None:
+    # Two columns beside each other are moved apart. Of the six edges of an inner vertex of theirs
+    # only the two along the column are calm, yet the four others all span.
+    mesh = grid(9, 9)
+    x, y = mesh.vertices[:, 0], mesh.vertices[:, 1]
+    uv = mesh.vertices[:, :2] + np.where(x == 4, 30, np.where(x == 5, -60, 0))[:, None]
+    inner = ((y[mesh.edges] > 0) & (y[mesh.edges] < 8)).all(axis=1)
+    left, right = np.sort(x[mesh.edges], axis=1).T
+    spans = (left < right) & (left >= 3) & (right <= 6)
+    assert np.array_equal(spanning_edges(mesh, uv)[inner], spans[inner])
+
+
+@pytest.mark.parametrize("mirror", [1, -1])
+def test_faces_that_span_are_turned_as_the_others(mirror: int) -> None:
+    mesh = grid(21, 3)
+    uv = (mesh.vertices[:, :2] + [30, 50] * (mesh.vertices[:, :1] > 10)) * [mirror, 1]
+    result = opened(mesh, uv, spanning_edges(mesh, uv))
+    a, b, c = (result.uv[result.corners[:, k]] for k in range(3))
+    first, second = b - a, c - a
+    area = (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / 2
+    np.testing.assert_allclose(area, mirror / 2)
+
+
+def test_a_seam_follows_the_tear_where_another_cut_is_shorter() -> None:
+    # The tear goes from (0, 5) on the rim to (20, 5): what is below is moved down, less and less to
+    # the right. From the lower rim its end is 5 away and not 20; but off the tear cuts cost ten
+    # times as much.
+    mesh = grid(31, 31)
+    x, y = mesh.vertices[:, 0], mesh.vertices[:, 1]
+    uv = np.stack([x, y - 3 * ((x < 20) & (y < 5)) * (20 - x)], axis=1)
+    seam = learned_seam(mesh, uv)
+    x, y = x[mesh.edges[seam]], y[mesh.edges[seam]]
+    assert x.min() == 0
+    assert x.max() >= 17
+    assert (np.abs(y - 4.5) <= 0.5).all()
