@@ -85,7 +85,7 @@ def places(points: FloatArray, tolerance: float = 0.0) -> IntArray:
 
     Args:
         points: coordinates.
-        tolerance: points that are no farther from one another, directly or through others, lie at
+        tolerance: points whose coordinates differ by no more, directly or through others, lie at
             one place.
     """
     order = np.lexsort(points.T)
@@ -97,7 +97,7 @@ def places(points: FloatArray, tolerance: float = 0.0) -> IntArray:
     if tolerance <= 0:
         return place
     apart = ordered[is_new]
-    pairs = cKDTree(apart).query_pairs(tolerance, output_type="ndarray")
+    pairs = cKDTree(apart).query_pairs(tolerance, p=np.inf, output_type="ndarray")
     if not len(pairs):
         return place
     links = sparse.coo_matrix((np.ones(len(pairs), bool), pairs.T), [len(apart)] * 2)
