@@ -94,3 +94,13 @@ def regress(session: nox.Session) -> None:
     """Compare the metric values of every deterministic method with the golden ones."""
     install(session)
     session.run("python", "-m", "benchmarks.checks.regress", *session.posargs)
+
+
+@nox.session
+def mutants(session: nox.Session) -> None:
+    """Try small wrong changes and count those noticed: `nox -s mutants -- --samples 60 --seed 0`.
+
+    tests/mutants/README.md says how, and which survivors are known.
+    """
+    install(session, "cluster", "uvunwrap", "mutants")
+    session.run("python", "tests/mutants/mutants.py", *session.posargs)

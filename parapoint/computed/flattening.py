@@ -22,6 +22,7 @@ from parapoint.computed.layout import scaled_layout
 from parapoint.computed.reconstruction import ReconstructionError, defects, triangulation
 from parapoint.computed.scale import area_discrepancy, even_scale, log_scale, mapped_areas, turning
 from parapoint.surfaces.cutting import cut_along, cut_to_disk
+from parapoint.surfaces.parameterization import Charted, Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 
 AREA_DISCREPANCY = 0.6
@@ -54,6 +55,7 @@ class FlatMap(NamedTuple):
         inverse_jacobians: (A, 3, 2) d x / d uv.
         facts: what was found, for reports: genus and boundary loops of the triangulation, faces,
             seam edges, whether it is of the denoised points.
+        charted: the whole triangulation, with both sides of its seams.
     """
 
     anchors: IntArray
@@ -61,10 +63,49 @@ class FlatMap(NamedTuple):
     jacobians: FloatArray
     inverse_jacobians: FloatArray
     facts: dict[str, Any]
+    charted: Charted
+
+    def turned(self) -> FlatMap:
+        """The same map seen from the other side of the surface: mirrored."""
+        mirror = np.array([-1.0, 1.0])
+        return self._replace(
+            uv=self.uv * mirror,
+            jacobians=self.jacobians * mirror[:, None],
+            inverse_jacobians=self.inverse_jacobians * mirror,
+            charted=self.charted.turned(),
+        )
 
 
-def flat_map(points: FloatArray, deadline: float = math.inf) -> FlatMap:
-    """A nearly conformal map of distinct points (N, 3), less so where `deadline` ends the descents.
+class Flattened(NamedTuple):
+    """A cloud as a triangle mesh, cut open and laid into the plane.
+
+    Attributes:
+        rows: (A,) rows of the cloud that the triangulation reached.
+        mesh: the triangulation of these A points.
+        disk: the mesh cut to a planar domain of M vertices.
+        origin: (M,) the vertex of `mesh` that each one of `disk` is or copies.
+        uv: (M, 2) images of the vertices of `disk`; the map is bijective and keeps the total area.
+        is_denoised: whether `mesh` is of the denoised points.
+    """
+
+    rows: IntArray
+    mesh: Mesh
+    disk: Mesh
+    origin: IntArray
+    uv: FloatArray
+    is_denoised: bool
+
+    def jacobians(self) -> FloatArray:
+        """(M, 2, 3) d uv / d x at the vertices of `disk`."""
+        return _vertex_jacobians(self.disk, self.uv)
+
+    def chosen(self) -> IntArray:
+        """(A,) the one vertex of `disk` that stands for each of `mesh`."""
+        return _chosen_copies(self.disk, self.origin)
+
+
+def flattened(points: FloatArray, deadline: float = math.inf) -> Flattened:
+    """Distinct points (N, 3) triangulated, cut and flattened; see `flat_map`.
 
     Raises:
         ReconstructionError: the points show no surface that can be followed and flattened.
@@ -85,18 +126,29 @@ def flat_map(points: FloatArray, deadline: float = math.inf) -> FlatMap:
         raise ReconstructionError(f"the triangulation has no flat map ({error})") from None
     uv -= (uv.max(axis=0) + uv.min(axis=0)) / 2
     uv *= np.sqrt(disk.face_areas.sum() / signed_areas(uv, disk.faces).sum())
-    chosen = _chosen_copies(disk, _origin(mesh, disk))
-    jacobians = _vertex_jacobians(disk, uv)[chosen]
-    boundary = [int((of.edge_face_count == 1).sum()) for of in (mesh, disk)]
+    return Flattened(reached, mesh, disk, _origin(mesh, disk), uv, is_denoised)
+
+
+def flat_map(points: FloatArray, deadline: float = math.inf) -> FlatMap:
+    """A nearly conformal map of distinct points (N, 3), less so where `deadline` ends the descents.
+
+    Raises:
+        ReconstructionError: the points show no surface that can be followed and flattened.
+    """
+    flat = flattened(points, deadline)
+    chosen = flat.chosen()
+    jacobians = flat.jacobians()[chosen]
+    boundary = [int((of.edge_face_count == 1).sum()) for of in (flat.mesh, flat.disk)]
     facts = {
-        "genus": mesh.genus,
-        "boundary_loops": len(mesh.boundary_loops),
-        "faces": len(mesh.faces),
+        "genus": flat.mesh.genus,
+        "boundary_loops": len(flat.mesh.boundary_loops),
+        "faces": len(flat.mesh.faces),
         "seam_edges": (boundary[1] - boundary[0]) // 2,
-        "denoised": is_denoised,
+        "denoised": flat.is_denoised,
     }
     inverse: FloatArray = np.asarray(np.linalg.pinv(jacobians, rcond=0.1), dtype=np.float64)
-    return FlatMap(reached, uv[chosen], jacobians, inverse, facts)
+    charted = Charted(flat.mesh, Parameterization(flat.uv, flat.disk.faces))
+    return FlatMap(flat.rows, flat.uv[chosen], jacobians, inverse, facts, charted)
 
 
 def _still(points: FloatArray) -> tuple[Mesh, bool]:

@@ -18,6 +18,9 @@ of stretches, in their own size, so that it stays small where a map shrinks all.
 SMALLEST = 1e-30
 """Added where all stretches may be 0, too."""
 
+LARGEST_LOG = 3.0
+"""Deviation of a log area beyond which it counts as this much: 20 times too large or too small."""
+
 
 class NotFiniteError(ArithmeticError):
     """The maps have left the finite numbers: the training diverged."""
@@ -168,16 +171,24 @@ def anti_flip_loss(points: Tensor, tangents: Tensor, neighbour_count: int, angle
     return (math.cos(angle) - cosine).clamp(min=0).sum(1).mean()
 
 
-def unfolding_loss(unfolding: Tensor) -> Tensor:
-    """Angle distortion of Unwrap∘Cut on the surface itself; not in the paper.
+def unfolding_loss(unfolding: Tensor, area_weight: float = 0.0) -> Tensor:
+    """Distortion of Unwrap∘Cut on the surface itself; not in the paper.
 
     Mean of (λ1 − λ2)² / (λ1² + λ2²) = (E + G − 2 det) / (E + G), in [0, 2]: 0 where conformal, 1
-    on a collapsed line, above 1 where det < 0, which is a fold.
+    on a collapsed line, above 1 where det < 0, which is a fold. And of the squared deviations of
+    log det from its median, which are the same for a part that is e times too large and for one
+    that is e times too small; by them it pays to cut.
 
     Args:
         unfolding: (2, N, 2) images of two tangent vectors, orthonormal and right-handed around the
             surface's oriented normal.
+        area_weight: of the second part.
     """
     (a, b), (c, d) = unfolding[0].unbind(1), unfolding[1].unbind(1)
-    stretch = a * a + b * b + c * c + d * d
-    return ((stretch - 2 * (a * d - b * c)) / (stretch + EPSILON)).mean()
+    stretch, area = a * a + b * b + c * c + d * d, a * d - b * c
+    angles = ((stretch - 2 * area) / (stretch + EPSILON)).mean()
+    if not area_weight:
+        return angles
+    log_area = area.clamp(min=EPSILON).log()
+    deviation = (log_area - log_area.detach().median()).clamp(-LARGEST_LOG, LARGEST_LOG)
+    return angles + area_weight * deviation.square().mean()

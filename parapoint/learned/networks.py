@@ -290,7 +290,7 @@ class SubNetworks(SurfaceNetworks):
     wrap: nn.Module
     unwrap: nn.Module
 
-    def forward(self, points: Tensor | None, grid: Tensor | None) -> Cycle:
+    def forward(self, points: Tensor | None, grid: Tensor | None, *, slopes: bool = True) -> Cycle:
         """Both branches at points P and lattice G (M, 2); None leaves a branch out.
 
         Both go through Wrap and Stitch, where the tangents are, together.
@@ -298,6 +298,7 @@ class SubNetworks(SurfaceNetworks):
         Args:
             points: (1, N, 3), or (3, N, 3) with two tangent vectors of the surface at each point.
             grid: (M, 2).
+            slopes: whether f_u, f_v and g_u, g_v are wanted; without them `tangents` are (0, N, 3).
         """
         wrapped = []
         if points is not None:
@@ -308,7 +309,7 @@ class SubNetworks(SurfaceNetworks):
             wrapped.append(self.deform(grid[None])[0])
         uv = torch.cat(wrapped)
         axes = torch.eye(2, dtype=uv.dtype, device=uv.device)[:, None].expand(2, len(uv), 2)
-        opened = self.wrap(torch.cat([uv[None], axes]))
+        opened = self.wrap(torch.cat([uv[None], axes]) if slopes else uv[None])
         closed = self.stitch(opened)
         count = 0 if points is None else points.shape[1]
         point_branch = grid_branch = None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import logging
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,21 +12,29 @@ from typing import ClassVar
 
 import torch
 
+from parapoint.computed.reconstruction import ReconstructionError
 from parapoint.estimator import Estimator
 from parapoint.fitting import Fitted, Progress, Session
 from parapoint.learned import presets
 from parapoint.learned.checkpoint import Checkpoint, identity
 from parapoint.learned.presets import Preset
+from parapoint.learned.start import computed_start
+from parapoint.learned.taught import TaughtTrainer
 from parapoint.learned.trained_map import TrainedMap, device_of, threads
 from parapoint.learned.trainer import Step, Trainer
 from parapoint.parameters import check_whole
 from parapoint.surfaces.frame import Frame
 from parapoint.surfaces.parameterization import TracePoint
-from parapoint.surfaces.sampling import FEWEST_POINTS, training_points
+from parapoint.surfaces.sampling import FEWEST_POINTS, training_points, without_coincident
 from parapoint.surfaces.surface import FloatArray, Surface
 
 logger = logging.getLogger("parapoint")
 
+STARTED_PER_SECOND = 60
+"""Points of a computed start for each second of the time budget: computing it takes a twentieth of
+the budget on one idle core."""
+STARTING = 0.25
+"""Share of the time budget after which a computed start is improved no more."""
 KEPT_MAPS = 8
 """Maps that go into the trace of `parameterize`, evenly over the run."""
 
@@ -61,6 +70,8 @@ class ParaPoint(Estimator):
         distortion_weight: its weight; the paper's text has 1e-4 for complex shapes.
         eigenvalues: "singular" or "gram", the readings of "the eigenvalues of the Jacobian".
         branches: "both", or an ablation: "3d" (3D→2D→3D alone) or "2d" (2D→3D→2D alone).
+        start: "hull", the points' convex hull, or "computed", a map that the networks are taught;
+            where none can be computed the hull takes its place.
         components: see `Estimator`.
         seed: of every random draw.
         device: "auto", "cpu" or "cuda".
@@ -81,6 +92,7 @@ class ParaPoint(Estimator):
     distortion_weight: float | None = None
     eigenvalues: str | None = None
     branches: str | None = None
+    start: str | None = None
     components: str = "together"
     seed: int = 0
     device: str = "auto"
@@ -99,16 +111,17 @@ class ParaPoint(Estimator):
         if self.threads is not None:
             check_whole("threads", self.threads, 1)
 
-    def numbers(self) -> Preset:
-        """The preset with this estimator's parameters in it.
+    def numbers(self, start: str | None = None) -> Preset:
+        """The preset with this estimator's parameters in it, or with another start.
 
         Raises:
             InputError: there is no such preset, or a parameter is not as said.
         """
-        preset = presets.named(self.preset)
+        start = start or self.start
+        preset = presets.named(self.preset, start)
         own = {field.name for field in dataclasses.fields(Preset)}
         given = {k: v for k, v in self.get_params().items() if k in own and v is not None}
-        return dataclasses.replace(preset, **given)
+        return dataclasses.replace(preset, **given | ({"start": start} if start else {}))
 
     def fit_part(self, surface: Surface, share: float, session: Session) -> Fitted:
         """See `parapoint.fitting.Strategy`.
@@ -119,22 +132,45 @@ class ParaPoint(Estimator):
         begun = time.monotonic()
         preset = self.numbers()
         count = max(FEWEST_POINTS, round(preset.points * share))
+        budget = None if self.time_budget is None else self.time_budget * share
+        if preset.start == "computed" and budget is not None:
+            count = min(count, max(FEWEST_POINTS, round(STARTED_PER_SECOND * budget)))
         preset = dataclasses.replace(preset, points=count)
         points = training_points(surface, count, self.seed)
         frame = Frame.of(points)
         with threads(self.threads):
-            trainer = Trainer(
-                frame.inside(points),
-                preset,
-                seed=self.seed,
-                device=device_of(self.device),
-                time_budget=None if self.time_budget is None else self.time_budget * share,
-            )
+            trainer, found = self._trainer(frame.inside(points), preset, budget, session)
             trace = self._trained(trainer, frame, points, session, begun)
         if trainer.divergences:
             logger.warning("training diverged once and went on with a smaller step")
-        map_ = TrainedMap(trainer.networks, preset, self.threads)
-        return Fitted(map_, frame, points, trace, self._report(trainer, trace))
+        map_ = TrainedMap(trainer.networks, trainer.preset, self.threads)
+        return Fitted(map_, frame, points, trace, self._report(trainer, trace) | found)
+
+    def _trainer(
+        self, cloud: FloatArray, preset: Preset, budget: float | None, session: Session
+    ) -> tuple[Trainer, dict[str, object]]:
+        """A trainer of points in the frame with its start, and what the report says of the start.
+
+        Where no map can be computed the hull is the start.
+        """
+        device = device_of(self.device)
+        found: dict[str, object] = {"start": preset.start}
+        if preset.start == "computed":
+            session.tell(Progress("computing a start"))
+            deadline = math.inf if budget is None else time.monotonic() + STARTING * budget
+            try:
+                start = computed_start(without_coincident(cloud), preset.gates, deadline)
+            except ReconstructionError as error:
+                logger.warning("no map could be computed, so the hull is the start: %s", error)
+                found = {"start": "hull", "start_not_computed": str(error)}
+            else:
+                taught = TaughtTrainer(
+                    start, preset, seed=self.seed, device=device, time_budget=budget
+                )
+                return taught, found
+        hull = dataclasses.replace(self.numbers("hull"), points=preset.points)
+        trainer = Trainer(cloud, hull, seed=self.seed, device=device, time_budget=budget)
+        return trainer, found
 
     def _trained(
         self,

@@ -18,6 +18,7 @@ CHOICES = {
     "distortion": ("conformal", "isometric"),
     "eigenvalues": ("singular", "gram"),
     "optimizer": ("adamw", "soap"),
+    "start": ("hull", "computed"),
 }
 """What each setting in words may say."""
 NUMBERS = (
@@ -28,6 +29,10 @@ NUMBERS = (
     "distortion_weight",
     "anti_flip_weight",
     "unfolding_weight",
+    "area_weight",
+    "map_weight",
+    "jacobian_weight",
+    "inverse_weight",
     "unwrap_spacing",
     "anti_flip_angle",
 )
@@ -44,6 +49,11 @@ class Preset:
         hidden: hidden layer sizes of every stack.
         embedding: d, channels of the embedding in Deform and Cut.
         activation: "leaky_relu" (slope 0.01) or "squareplus" (width 0.2).
+        features: Fourier features of each network's input (see `features.FeatureNetworks`); 0 are
+            the paper's networks.
+        gates: seams at which Cut can jump; used with features alone.
+        start: "hull", the paper's, or "computed", a map that the networks are taught and that takes
+            the place of the hull (see `parapoint.learned.start`).
         branches: "both", or one of the ablations "3d" (3D→2D→3D alone) and "2d".
         points: training points.
         iterations: steps, warm-up included (the text gives none; the group's later code 10,000).
@@ -61,6 +71,8 @@ class Preset:
         unwrap_weight, wrap_weight, cycle_weight, distortion_weight, anti_flip_weight: weights.
         unfolding_weight: of `losses.unfolding_loss` on the cloud's tangent planes; 0 in the paper,
             which then does without normals.
+        area_weight: of areas against angles in the unfolding loss.
+        map_weight, jacobian_weight, inverse_weight: of what a computed start teaches.
         distortion: "conformal" or "isometric".
         eigenvalues: "singular" values of the Jacobian, or of its "gram" matrix (open).
         unwrap_neighbours: K_u (open; the group's later code has 8).
@@ -74,6 +86,9 @@ class Preset:
     hidden: tuple[int, ...] = (64, 128, 512, 128)
     embedding: int = 64
     activation: str = "leaky_relu"
+    features: int = 0
+    gates: int = 0
+    start: str = "hull"
     branches: str = "both"
     points: int = 10_000
     iterations: int = 10_000
@@ -90,6 +105,10 @@ class Preset:
     distortion_weight: float = 0.01
     anti_flip_weight: float = 0.01
     unfolding_weight: float = 0.0
+    area_weight: float = 0.0
+    map_weight: float = 0.0
+    jacobian_weight: float = 0.0
+    inverse_weight: float = 0.0
     distortion: str = "conformal"
     eigenvalues: str = "singular"
     unwrap_neighbours: int = 8
@@ -108,6 +127,8 @@ class Preset:
             check_whole(name, getattr(self, name), least)
         for name in ("patch", "starts", "embedding", "unwrap_neighbours", "anti_flip_neighbours"):
             check_whole(name, getattr(self, name), 1)
+        for name in ("features", "gates"):
+            check_whole(name, getattr(self, name), 0)
         for size in self.hidden:
             check_whole("a hidden layer's size", size, 1)
         for name, choices in CHOICES.items():
@@ -118,6 +139,10 @@ class Preset:
             check_number(name, getattr(self, name))
         if self.learning_rate is not None:
             check_number("learning_rate", self.learning_rate)
+        if self.start == "computed" and self.branches == "2d":
+            raise InputError('branches "2d" maps no points that could be taught; take start "hull"')
+        if self.start == "computed" and not (self.features and self.gates):
+            raise InputError('start "computed" needs networks with features and gates')
         check_number("start_share", self.start_share, most=1 / self.starts)
         one_run = 1 - self.start_share * (self.starts - 1)
         if self.starts > 1 and self.warm_up * one_run >= self.start_share:
@@ -142,7 +167,8 @@ class Preset:
 
     def largest_layer(self) -> int:
         """Weights, biases included, of the largest layer of the networks."""
-        sizes = [3 + self.embedding, *self.hidden, max(3, self.embedding)]
+        widest = max(self.embedding, 2 * self.features + self.gates)
+        sizes = [3 + widest, *self.hidden, max(3, self.embedding)]
         return max((a + 1) * b for a, b in itertools.pairwise(sizes))
 
 
@@ -157,19 +183,47 @@ PAPER = Preset(
 """The paper: every number that the text gives, and the open ones as measured (docs/METHOD.md)."""
 
 LEARNED = Preset(
-    hidden=(256, 256, 256),
+    hidden=(240, 240, 240),
     activation="squareplus",
-    subset=512,
+    features=64,
+    gates=24,
+    start="computed",
+    iterations=8_000,
+    subset=384,
+    all_from=1.0,
+    warm_up=0.0,
+    wrap_weight=0.1,
+    unfolding_weight=0.1,
+    area_weight=0.02,
+    map_weight=2.0,
+    jacobian_weight=1.0,
+    inverse_weight=1.0,
+    optimizer="soap",
+    learning_rate=1e-2,
+)
+"""Ours, from a computed start. It departs from the text in this:
+
+- Networks: a smooth activation (a piecewise linear network has a piecewise constant Jacobian),
+  Fourier features of their inputs, and gates in Cut, which can so open a surface at once.
+- Start: in place of the hull a computed map, whose values and derivatives, and the banks of whose
+  seams, the networks are taught (`parapoint.learned.start`, `parapoint.learned.taught`).
+- Losses: the conformal and the anti-flip term look at the map of the points (`unfolding_loss`)
+  and not at that of the plane; areas count a little.
+
+docs/METHOD.md has what each change was measured to bring."""
+
+LEARNED_FROM_HULL = Preset(
+    activation="squareplus",
+    subset=256,
+    patch=8,
     all_from=1.0,
     iterations=3_000,
-    cycle_weight=0.1,
-    unfolding_weight=0.1,
+    unfolding_weight=0.3,
+    area_weight=0.02,
+    optimizer="soap",
 )
-"""Our training of the paper's networks. It departs from the text in a smooth activation (a
-piecewise linear network has a piecewise constant Jacobian), in layers of equal width, in a larger
-weight of the cycle, and in a conformal term on the tangent planes of the cloud, signed by normals
-that are oriented first, so that folds are pushed out. docs/METHOD.md has what each change was
-measured to bring."""
+"""Ours, from the paper's start: `learned` where no map can be computed, or where that is asked for.
+The paper's networks and weights, a smooth activation, patches, and the unfolding loss."""
 
 PRESETS = {"paper": PAPER, "learned": LEARNED}
 
@@ -181,8 +235,8 @@ RENAMED = {
 """Names that a preset does not have, and what to say of each."""
 
 
-def named(preset: str) -> Preset:
-    """The preset of that name.
+def named(preset: str, start: str | None = None) -> Preset:
+    """The preset of that name; "learned" has numbers of its own for the start "hull".
 
     Raises:
         InputError: there is none.
@@ -191,4 +245,6 @@ def named(preset: str) -> Preset:
         raise InputError(f"no preset {preset!r}: {RENAMED[preset]}")
     if preset not in PRESETS:
         raise InputError(f"no preset {preset!r}; there are: {', '.join(PRESETS)}")
+    if preset == "learned" and start == "hull":
+        return LEARNED_FROM_HULL
     return PRESETS[preset]

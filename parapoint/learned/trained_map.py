@@ -12,7 +12,8 @@ import torch
 from torch import Tensor
 
 from parapoint.errors import InputError
-from parapoint.learned.networks import ACTIVATIONS, Networks, SurfaceNetworks
+from parapoint.learned.features import FeatureNetworks
+from parapoint.learned.networks import ACTIVATIONS, Networks, SubNetworks, SurfaceNetworks
 from parapoint.learned.presets import Preset
 from parapoint.surfaces.surface import FloatArray
 
@@ -59,6 +60,9 @@ class TrainedMap:
         """See `SurfaceMap`."""
         return {name: of.cpu().numpy() for name, of in self.networks.state_dict().items()}
 
+    def charted(self) -> None:
+        """See `SurfaceMap`."""
+
     def facts(self) -> dict[str, Any]:
         """See `SurfaceMap`."""
         return {"preset": self.preset.facts()}
@@ -80,10 +84,14 @@ class TrainedMap:
         return cls(networks.to(device_of(device)), preset)
 
 
-def new_networks(preset: Preset, generator: torch.Generator) -> Networks:
+def new_networks(preset: Preset, generator: torch.Generator) -> SubNetworks:
     """Networks of a preset with random weights."""
+    sizes = preset.hidden, preset.embedding
     activation = ACTIVATIONS[preset.activation]
-    return Networks(preset.hidden, preset.embedding, activation, generator)
+    if preset.features:
+        of = preset.features, preset.gates
+        return FeatureNetworks(*sizes, *of, activation=activation, generator=generator)
+    return Networks(*sizes, activation, generator)
 
 
 def device_of(name: str) -> str:

@@ -17,9 +17,10 @@ from torch import Tensor
 
 from parapoint.learned import losses
 from parapoint.learned.batches import Cloud, lattice
-from parapoint.learned.networks import ACTIVATIONS, Cycle, Networks, SubNetworks, SurfaceNetworks
+from parapoint.learned.networks import Cycle, SubNetworks, SurfaceNetworks
 from parapoint.learned.optimizers import OPTIMIZERS
 from parapoint.learned.presets import Preset
+from parapoint.learned.trained_map import new_networks
 from parapoint.surfaces.sampling import hull_sample, mean_spacing
 from parapoint.surfaces.surface import FloatArray
 
@@ -126,7 +127,7 @@ class Trainer:
         self.generator = torch.Generator().manual_seed(seed)
         self.starts = preset.starts if networks is None else 1
         self.networks = (self._new_networks() if networks is None else networks).to(device)
-        parameters: list[Tensor] = list(self.networks.parameters())
+        parameters: list[Tensor] = [p for p in self.networks.parameters() if p.requires_grad]
         self.optimizer = OPTIMIZERS[preset.optimizer](parameters)
         self.device = device
         self.shape = self.hull = Cloud(self.prepared(points), preset.patch)
@@ -249,9 +250,8 @@ class Trainer:
         for name in _FACTS:
             setattr(self, name, facts[name])
 
-    def _new_networks(self) -> Networks:
-        activation = ACTIVATIONS[self.preset.activation]
-        return Networks(self.preset.hidden, self.preset.embedding, activation, self.generator)
+    def _new_networks(self) -> SubNetworks:
+        return new_networks(self.preset, self.generator)
 
     def _choose_subset(self, budget: float) -> None:
         """Once the first steps are timed, take as many points as leave enough steps."""
@@ -384,7 +384,7 @@ def objective_terms(
         cycle_terms += [(there.points, there.points_cycle), (there.cut, there.cut_cycle)]
         tangents_at.append((there.points_cycle, there.tangents))
         if len(there.unfolding):
-            terms["unfolding"] = losses.unfolding_loss(there.unfolding)
+            terms["unfolding"] = losses.unfolding_loss(there.unfolding, preset.area_weight)
     if cycle.grid is not None:
         back = cycle.grid
         terms["wrap"] = losses.wrap_loss(back.points if made is None else made, points)
@@ -439,7 +439,11 @@ def oriented_normals(points: FloatArray, neighbours: int = 12) -> FloatArray:
 
 def tangent_frames(points: FloatArray) -> FloatArray:
     """(2, N, 3) orthonormal tangent vectors, right-handed around the oriented normals."""
-    normals = oriented_normals(points)
+    return tangents_of(oriented_normals(points))
+
+
+def tangents_of(normals: FloatArray) -> FloatArray:
+    """(2, N, 3) orthonormal vectors, right-handed around unit normals (N, 3)."""
     least = np.eye(3)[np.abs(normals).argmin(axis=1)]
     first = np.cross(normals, least)
     first /= np.linalg.norm(first, axis=1, keepdims=True)

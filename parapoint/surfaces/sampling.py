@@ -15,6 +15,8 @@ logger = logging.getLogger("parapoint")
 
 FEWEST_POINTS = 100
 """Distinct points that a fit needs."""
+COINCIDENT = 1e-6
+"""Points that agree to this, in radii of the surface, count as one."""
 FEWEST_VERTICES = 2_000
 NEAREST = 3
 FAR = 0.005
@@ -60,6 +62,12 @@ def training_points(surface: Surface, count: int, seed: int) -> FloatArray:
     if len(distinct) > count:
         distinct = distinct[np.sort(rng.choice(len(distinct), count, replace=False))]
     return np.ascontiguousarray(distinct)
+
+
+def without_coincident(cloud: FloatArray) -> FloatArray:
+    """(M, 3) the points (N, 3) of a cloud in its frame, without those that coincide with others."""
+    _, rows = np.unique(np.round(cloud / COINCIDENT), axis=0, return_index=True)
+    return cloud[np.sort(rows)]
 
 
 def rows_left_out(surface: Surface) -> dict[str, object]:

@@ -131,12 +131,16 @@ def _rank(
     texts: Sequence[Sequence[str]],
     marks: list[list[Mark]],
 ) -> None:
-    """Mark the best and the second of the values at `places`; what prints alike ranks alike."""
+    """Mark the best and the second of the values at `places`; what prints alike ranks alike.
+
+    A row whose values have a direction of their own gives it under "better".
+    """
     numbers: dict[tuple[int, int], float] = {}
     for row, column in places:
         value = block[row].get(columns[column].key)
         if isinstance(value, int | float) and math.isfinite(value):
-            numbers[row, column] = value if columns[column].better == "lower" else -value
+            better = block[row].get("better", columns[column].better)
+            numbers[row, column] = value if better == "lower" else -value
     order = list(dict.fromkeys(texts[r][c] for r, c in sorted(numbers, key=numbers.__getitem__)))
     if len(order) < 2:
         return

@@ -179,6 +179,19 @@ def test_a_branch_must_pay():
     assert energies[1] < energies[0] - 0.05
 
 
+def test_the_price_of_a_seam_is_the_same_at_every_scale():
+    cap = builtin.sphere_cap(150, rings=5)
+    grown = []
+    for scale in (1, 2.0**10):  # exact: the two runs differ by nothing but the unit
+        run = hybrid._Run(Mesh(scale * cap.vertices, cap.faces))
+        run.begin(None)
+        run.improve(3)
+        run.lengthen(0.05)
+        grown.append((run.branches, run.energy))
+    assert grown[0][0] > 0
+    assert grown[1] == pytest.approx(grown[0], rel=1e-3)
+
+
 def test_the_artist_s_charts_are_kept_and_packed_apart():
     mesh = sphere()
     disk = cut_to_disk(mesh)

@@ -102,6 +102,19 @@ def test_atlases_are_known_by_their_charts(tmp_path):
     assert contents(tmp_path)[0].atlases == {"xatlas"}
 
 
+@pytest.mark.parametrize(("many", "atlases"), [(1, set()), (2, {"xatlas"})])
+def test_an_atlas_cuts_most_models_and_not_just_one(tmp_path, many, atlases):
+    mesh = sheet()
+    whole = flat(mesh)
+    pieces = type(whole)(whole.uv[whole.corners].reshape(-1, 2), range_corners(len(mesh.faces)))
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for number, case in enumerate("abc"):
+            writer.cell(case, mesh, "lscm", {}, result=whole)
+            writer.cell(case, mesh, "xatlas", {}, result=pieces if number < many else whole)
+    assert contents(tmp_path)[0].atlases == atlases
+
+
 def range_corners(count):
     return [[3 * k, 3 * k + 1, 3 * k + 2] for k in range(count)]
 

@@ -124,6 +124,22 @@ def test_two_triangles_by_hand():
     assert_allclose(values["symmetric_dirichlet"], 0.4 + 2.5 + 1.6 + 0.625, rtol=EXACT)
 
 
+def test_large_faces_count_for_more():
+    # A triangle of area 12.5 keeps its shape; one of area 0.5, 1/26 of all, is stretched to 4.
+    points = np.array([[0, 0], [5, 0], [0, 5], [7, 0], [8, 0], [7, 1.0]])
+    faces = np.array([[0, 1, 2], [3, 4, 5]])
+    uv = np.concatenate([points[:3], points[3:] * [4, 1]])
+    values = evaluate(in_plane(points, faces), Parameterization(uv, faces))
+    # With both areas scaled to 1, sigma^2 of the large triangle is 13 / 14.5 = 26 / 29.
+    square = 26 / 29
+    large = 2 * (square + 1 / square)
+    small = (16 + 1) * square + (1 / 16 + 1) / square
+    assert_allclose(values["symmetric_dirichlet"], (25 * large + small) / 26, rtol=EXACT)
+    assert_allclose(values["quasi_conformal_mean"], (25 + 4) / 26, rtol=EXACT)
+    assert_allclose(values["quasi_conformal_p95"], 1, rtol=EXACT)  # 25/26 of the area: 96 %
+    assert_allclose(values["quasi_conformal_max"], 4, rtol=EXACT)
+
+
 def test_the_area_ratio_is_clipped_at_ten():
     points = np.array([[0, 0], [1, 0], [0, 1], [3, 0], [4, 0], [3, 1.0]])
     faces = np.array([[0, 1, 2], [3, 4, 5]])

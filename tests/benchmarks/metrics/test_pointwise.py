@@ -29,7 +29,7 @@ def test_a_similarity_is_perfect(scale):
     turn = np.linalg.qr(np.random.default_rng(1).normal(size=(2, 2)))[0]
     values = scores(points, scale * points @ turn + scale)
     expected = {m.name for m in METRICS.values() if m.group == "points"}
-    assert set(values) == expected
+    assert set(values) == expected | {"coverage"}
     for name in expected:
         ideal = METRICS[name].ideal
         if ideal is not None:
@@ -100,6 +100,16 @@ def test_two_sheets_on_one_another_collide():
     assert stacked["neighbour_trustworthiness"] < apart["neighbour_trustworthiness"]
 
 
+@pytest.mark.parametrize(("apart", "share"), [(20, 0), (21, 34 / 42)])
+def test_only_what_lies_five_neighbourhoods_away_collides(apart, share):
+    # Points at 0, 1, 2, ... on a line: the 8th neighbour of all but the 4 at each end is 4 away.
+    # The map puts each point beside the one `apart` away, which collides from above 5 * 4 on.
+    x = np.arange(2.0 * apart)
+    uv = np.column_stack([10 * (x % apart) + (x >= apart), 0 * x])
+    values = scores(np.column_stack([x, 0 * x]), uv)
+    assert_allclose(values["uv_collision_fraction"], share, rtol=EXACT)
+
+
 def test_seam_points_by_hand():
     # Nine points on a line, of which the map moves the last three away by a fifth of L.
     x = np.arange(9.0)
@@ -153,4 +163,4 @@ def test_few_points_and_other_lengths_are_refused():
         point_map(PointCloud(np.eye(3)), PointParameterization(np.zeros((3, 2))))
     with pytest.raises(InputError, match="5 uv rows for a cloud of 6 points"):
         point_map(PointCloud(np.zeros((6, 3))), PointParameterization(np.zeros((5, 2))))
-    assert len(scores(plane(4), plane(4))) == 10
+    assert len(scores(plane(4), plane(4))) == 13

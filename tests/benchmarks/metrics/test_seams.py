@@ -167,6 +167,21 @@ def test_a_coarse_mesh_has_no_spanning_face_by_its_long_edges_alone():
     assert not spanning(mesh, parameterization).any()
 
 
+def test_one_calm_bank_is_enough():
+    # A strip of squares; from column 5 on all is drawn 40 times as large, 100 away. The edges in
+    # between are stretched by 100: more than 5 times what is usual on the left (1), but less than
+    # 5 times what is usual on the right (40).
+    x, y = np.meshgrid(np.arange(9.0), np.arange(2.0), indexing="ij")
+    points, faces = np.stack([x.ravel(), y.ravel()], 1), builtin.grid_faces(9, 2)
+    right = points[:, :1] > 4
+    uv = np.where(right, [104, 0] + 40 * (points - [5, 0]), points)
+    mesh = Mesh(np.column_stack([points, 0 * points[:, 0]]), faces)
+    given = Parameterization(uv, faces)
+    between = right[given.edges, 0].sum(axis=1) == 1
+    assert between.sum() == 3
+    assert (seams.spanning_edges(mesh, given) == between).all()
+
+
 def test_edges_without_length_do_not_span():
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0.0]])
     mesh = Mesh(vertices, [[0, 1, 2], [0, 3, 1]])

@@ -22,7 +22,7 @@ from benchmarks.cases import models
 from benchmarks.cases.suites import Suite
 from benchmarks.checks import endurance
 from benchmarks.metrics.table import evaluate_points
-from benchmarks.running import executors, runner, worker
+from benchmarks.running import environment, executors, runner, worker
 from benchmarks.running.runner import Summary, run
 from benchmarks.store.results import ResultRow, Store
 from parapoint.errors import InputError
@@ -197,7 +197,7 @@ def test_a_fault_is_a_row_with_its_reason(faulty, method, status, reason):
 
 
 def test_nan_names_the_first_bad_row(faulty):
-    assert row_of(faulty, "blank").reason.startswith("InputError: uv must be finite; row 0")
+    assert row_of(faulty, "blank").reason == "the map has no place for anything: every uv is NaN"
 
 
 def test_a_row_that_is_not_ok_has_the_last_lines_of_the_output(faulty):
@@ -646,3 +646,40 @@ def test_the_seams_of_a_model_s_own_map_reach_the_methods_that_require_them_alon
     row = found["fish_control_mesh", "seams"]
     assert row.report == {"seams": len(store.reference(row).seams(store.surface(row)))}
     assert found["fish_control_mesh", "blind"].report == {"seams": False}
+
+
+@pytest.mark.usefixtures("in_process")
+def test_a_cell_that_is_asked_for_twice_runs_once(tmp_path):
+    twice = dataclasses.replace(suite("tutte", "tutte", seeds=(0, 0)), cases=(CASE, CASE))
+    assert dict(run(twice, tmp_path).reasons) == {"new": 1}
+    assert len(list(Store(tmp_path).history())) == 1
+    again = run(twice, tmp_path)
+    assert (again.ran, len(again.kept)) == ([], 1)
+
+
+HERE = {"time_limit": 10.0, "memory_limit": 1e9} | dict.fromkeys(environment.MACHINE, "as here")
+
+
+@pytest.mark.parametrize(
+    ("status", "there", "why"),
+    [
+        ("failed", {}, ""),
+        *(
+            ("failed", {name: "other"}, "failed in another environment")
+            for name in environment.MACHINE
+        ),
+        ("timeout", {"time_limit": 10.0}, ""),
+        ("timeout", {"time_limit": 9.0}, "limit raised"),
+        ("timeout", {"time_limit": 20.0}, ""),  # it would end no sooner now
+        ("timeout", {"memory_limit": 1.0}, ""),  # it was not memory that it lacked
+        ("out_of_memory", {"memory_limit": 0.995e9}, ""),  # the total of a machine varies a little
+        ("out_of_memory", {"memory_limit": 0.9e9}, "limit raised"),
+        ("out_of_memory", {"memory_limit": 2e9}, ""),
+        ("out_of_memory", {"time_limit": 1.0}, ""),
+    ],
+)
+def test_what_did_not_end_well_runs_again_only_where_it_may_end_better(
+    tmp_path, status, there, why
+):
+    row = ResultRow("id", "trial", CASE, "slow", {}, 0, "source", "surface", status)
+    assert runner._changed(row, row, Store(tmp_path), [HERE | there], HERE) == why

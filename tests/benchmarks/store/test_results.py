@@ -156,6 +156,18 @@ def test_a_torn_end_is_set_aside_and_said(tmp_path, caplog, tail):
     assert not list(store.faults())
 
 
+def test_torn_ends_gather_one_after_another(tmp_path):
+    store = Store(tmp_path)
+    for seed, tail in enumerate((b"first", b"second")):
+        with store.writing():
+            add(store, seed=seed)
+        with (tmp_path / "runs.jsonl").open("ab") as stream:
+            stream.write(tail)
+    with store.writing():
+        pass
+    assert (tmp_path / "runs.torn").read_bytes() == b"first\nsecond\n"
+
+
 def test_every_torn_prefix_keeps_the_rows_before_it(tmp_path):
     store = Store(tmp_path)
     with store.writing():

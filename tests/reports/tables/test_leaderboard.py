@@ -11,7 +11,7 @@ from reports.contents import (
 )
 from reports.tables.leaderboard import SHOWN, data, definition, glances, winner
 
-from ..conftest import DEVIL, HAND, HOSTILE, NEFERTITI
+from ..conftest import DEVIL, HAND, HOSTILE, NEFERTITI, Writer, flat, sheet
 
 
 @pytest.fixture
@@ -26,6 +26,18 @@ def test_the_winner_is_the_best_by_the_metric_s_direction(suite):
     assert len(winner(suite, HAND, "seconds").names) == 3  # equals win together
     assert winner(suite, NEFERTITI, "angle_difference_mean").names == ("ParaPoint",)
     assert winner(suite, NEFERTITI, "bijective") is None  # no map is
+
+
+@pytest.mark.parametrize(
+    ("second", "names"),
+    [(1.0, ("LSCM", "ARAP")), (1.004, ("LSCM", "ARAP")), (1.02, ("LSCM",)), (0.98, ("ARAP",))],
+)
+def test_equal_to_three_digits_is_equal(tmp_path, second, names):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for method, seconds in (("lscm", 1.0), ("arap", second)):
+            writer.cell(HAND, sheet(), method, {}, result=flat(sheet()), seconds=seconds)
+    assert set(winner(contents(tmp_path)[0], HAND, "seconds").names) == set(names)
 
 
 def test_at_a_glance(suite):

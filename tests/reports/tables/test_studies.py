@@ -109,6 +109,15 @@ def test_seed_variance_tells_the_deterministic_from_the_seeded(tmp_path):
     assert ours["done"] == "3/3"
 
 
+def test_a_value_that_is_missing_on_a_common_model_leaves_no_mean(tmp_path):
+    suite = seeded(tmp_path, cases=("a", "b"), seeds=(0,))
+    records = suite.records
+    records["b", "LSCM"]["seconds"] = math.nan
+    rows = {row["label"]: row for row in means_by_kind(suite).blocks[0]}
+    assert "seconds" not in rows["LSCM"]  # the mean over one model would stand beside one over two
+    assert rows["ParaPoint"]["seconds"] == 0.25
+
+
 def test_one_seed_or_few_models_give_no_statistics(results):
     suite = contents(results)[0]
     assert seed_variance(suite) is None

@@ -3,7 +3,7 @@ import pytest
 from reports.contents import contents
 from reports.tables.suites import comparison, conformality, failures, supplement
 
-from ..conftest import DEVIL, HAND, HOSTILE, NEFERTITI
+from ..conftest import DEVIL, HAND, HOSTILE, NEFERTITI, Writer, flat, sheet
 
 
 def test_conformality_keeps_published_figures_apart(results):
@@ -51,6 +51,37 @@ def test_comparison_counts_and_common_means(results):
     assert ours["common"] == pytest.approx(values.iloc[:2].mean())
     assert rows[HOSTILE]["mean"] is None
     assert f"2: {HAND}, {DEVIL}" in made.caption
+    assert [column.head for column in made.columns[2:6]] == [
+        *("mean ↓", "median ↓", "worst ↓", "common mean ↓"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "better", "worst", "marks"),
+    [
+        ("seconds", "lower", 9.0, ["best", "second"]),
+        ("packing_efficiency", "higher", 1.0, ["second", "best"]),
+    ],
+)
+def test_comparison_by_hand(tmp_path, name, better, worst, marks):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for case in "abc":
+            for method in ("lscm", "arap"):
+                writer.cell(case, sheet(), method, {}, result=flat(sheet()))
+    suite = contents(tmp_path)[0]
+    for label, values in (("LSCM", [1.0, 2.0, 9.0]), ("ARAP", [5.0, 5.5, 6.0])):
+        suite.means.loc[suite.means["label"] == label, name] = values
+    made = comparison(suite, [name])
+    (block,) = made.blocks
+    rows = {row["label"]: row for row in block}
+    assert rows["LSCM"]["better"] == better
+    lscm, arap = rows["LSCM"], rows["ARAP"]
+    assert (lscm["mean"], lscm["median"], lscm["worst"]) == (4, 2, worst)
+    assert (arap["mean"], arap["median"], arap["common"]) == (5.5, 5.5, 5.5)
+    at = [column.key for column in made.columns].index("mean")
+    shown = {row["label"]: cells[at].mark for row, cells in zip(block, made.cells[0], strict=True)}
+    assert [shown["LSCM"], shown["ARAP"]] == marks
 
 
 def test_failures_are_told_with_status_and_reason(results):

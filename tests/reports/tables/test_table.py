@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from reports.tables.table import Column, Table
+from reports.tables.table import Column, Table, metric_column
 
 COLUMNS = (
     Column("name", "Name", text=True, once=True),
@@ -73,3 +73,17 @@ def test_printed_values(value, text):
 
 def test_a_fraction_is_shown_as_per_cent():
     assert COLUMNS[2].shown(0.1234) == "12.3"
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("seconds", "12.35"),
+        ("angle_difference_mean", "12.3457"),  # radians
+        ("chart_count", "12.3"),  # a mean over models, so not always whole
+        ("quasi_conformal_mean", "12.346"),
+        ("flipped_fraction", "1,234.57"),  # per cent
+    ],
+)
+def test_metrics_have_the_digits_of_their_kind(name, text):
+    assert metric_column(name).shown(12.34567) == text

@@ -1,0 +1,203 @@
+"""Mutation testing: make small wrong changes, one at a time, and count those that a test notices.
+
+The operators are Cosmic Ray's. A sample of lines, the same for the same seed and equally many from
+each package, is changed in a copy of the checkout. The tests that mirror the changed module run
+first, then those of its room, then those of its package, until one fails.
+Exit status: 0, or 1 if less than 85 % are noticed, or 2 if the unchanged code fails.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import parso
+from cosmic_ray.ast import ast_nodes
+from cosmic_ray.mutating import mutate_code
+from cosmic_ray.plugins import get_operator
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("parapoint", "baselines", "benchmarks", "reports")
+LEAST_SHARE = 0.85
+"""The share of the mutants that the tests must notice."""
+PATIENCE = 3.0
+"""A mutant whose tests take this many times as long as without it, and a minute, is noticed."""
+FAMILIES = {
+    "arithmetic": [
+        f"ReplaceBinaryOperator_{pair}"
+        for pair in ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "Pow_Mul", "FloorDiv_Mul")
+    ],
+    "comparison": [
+        f"ReplaceComparisonOperator_{pair}"
+        for pair in (
+            *("Eq_NotEq", "NotEq_Eq", "Is_IsNot", "IsNot_Is", "Lt_LtE", "LtE_Lt", "Gt_GtE"),
+            *("GtE_Gt", "Lt_GtE", "GtE_Lt", "Gt_LtE", "LtE_Gt"),
+        )
+    ],
+    "logic": ["AddNot", "ReplaceAndWithOr", "ReplaceOrWithAnd", "ReplaceUnaryOperator_Delete_Not"],
+    "bits": ["ReplaceBinaryOperator_BitAnd_BitOr", "ReplaceBinaryOperator_BitOr_BitAnd"],
+    "sign": ["ReplaceUnaryOperator_Delete_USub"],
+    "constant": ["NumberReplacer", "ReplaceTrueWithFalse", "ReplaceFalseWithTrue"],
+    "flow": ["ZeroIterationForLoop", "ReplaceBreakWithContinue", "ReplaceContinueWithBreak"],
+}
+"""Cosmic Ray's operators by kind. All kinds that fit a line are equally likely."""
+TALK = frozenset({"print", "echo", "secho", "debug", "info", "warning", "fail", "InputError"})
+"""Functions whose arguments are words for a reader."""
+
+Position = tuple[int, int]
+"""Line, from 1, and column, from 0."""
+
+
+def ignored(source: str) -> list[tuple[Position, Position]]:
+    """Where no mutant is made: type hints, decorators, messages, imports, `strict=` of zip."""
+    lines = source.splitlines()
+
+    def span(node: ast.AST) -> tuple[Position, Position]:
+        def at(line: int, column: int) -> Position:  # ast counts bytes, parso characters
+            return line, len(lines[line - 1].encode()[:column].decode())
+
+        return at(node.lineno, node.col_offset), at(node.end_lineno, node.end_col_offset)
+
+    found: list[ast.AST] = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Raise | ast.Assert | ast.JoinedStr | ast.Import | ast.ImportFrom):
+            found.append(node)
+        elif isinstance(node, ast.Call):
+            name = getattr(node.func, "attr", getattr(node.func, "id", ""))
+            found += [node] if name in TALK else []
+            found += [key for key in node.keywords if key.arg == "strict"]
+        elif isinstance(node, ast.arg | ast.AnnAssign):
+            found += [node.annotation] if node.annotation else []
+        elif isinstance(node, ast.FunctionDef | ast.ClassDef):
+            found += [*node.decorator_list, getattr(node, "returns", None) or ast.Pass()]
+    return [span(node) for node in found if hasattr(node, "lineno")]
+
+
+def is_star(node: parso.tree.NodeOrLeaf) -> bool:
+    """Whether a node is the star or slash of a signature or call, which multiplies nothing."""
+    parent = node.parent.type if node.parent else ""
+    return node.type == "operator" and parent in {"parameters", "param", "argument", "star_expr"}
+
+
+def mutants(source: str) -> dict[int, dict[str, list[tuple[str, int]]]]:
+    """The possible mutants by line and family: each an operator and its occurrence."""
+    nodes = list(ast_nodes(parso.parse(source)))
+    quiet = ignored(source)
+    found: dict[int, dict[str, list[tuple[str, int]]]] = {}
+    for family, names in FAMILIES.items():
+        for name in names:
+            operator = get_operator(f"core/{name}")()
+            places = ((node, at) for node in nodes for at, _ in operator.mutation_positions(node))
+            for occurrence, (node, start) in enumerate(places):
+                if not is_star(node) and not any(first <= start < last for first, last in quiet):
+                    line = found.setdefault(start[0], {})
+                    line.setdefault(family, []).append((name, occurrence))
+    return found
+
+
+def sample(chance: random.Random, package: str) -> Iterator[tuple[Path, int, str, str]]:
+    """Mutants of a package without end: the file, line, operator, and the source changed by it."""
+    files = sorted((ROOT / package).rglob("*.py"))
+    sizes = [path.read_text(encoding="utf-8").count("\n") for path in files]
+    while True:
+        (path,) = chance.choices(files, sizes)
+        source = path.read_text(encoding="utf-8")
+        if not (found := mutants(source)):
+            continue
+        line = chance.choice(sorted(found))
+        name, occurrence = chance.choice(found[line][chance.choice(sorted(found[line]))])
+        changed = mutate_code(source, get_operator(f"core/{name}")(), occurrence)
+        if changed is not None and ast.dump(ast.parse(changed)) != ast.dump(ast.parse(source)):
+            yield path.relative_to(ROOT), line, name, changed
+
+
+def stages(copy: Path, module: Path) -> list[str]:
+    """What to run for a module, the nearest tests first, nothing twice."""
+    mirror = Path("tests", module.parent, f"test_{module.stem}.py")
+    room = mirror.parent
+    wanted = (mirror, room, Path("tests", module.parts[0]))
+    return list(dict.fromkeys(str(path) for path in wanted if (copy / path).exists()))
+
+
+def passes(copy: Path, tests: str, limit: float | None, *, printed: bool = False) -> bool:
+    """Whether the tests pass in the copy within `limit` seconds; `printed` shows a failure."""
+    command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", tests]
+    command += [] if tests.endswith(".py") else ["-n", "logical", "--dist", "worksteal"]
+    environment = os.environ | {
+        "PYTHONPATH": str(copy),
+        "PYTHONDONTWRITEBYTECODE": "1",  # a stale byte code file would hide the next mutant
+        "OMP_NUM_THREADS": "1",
+    }
+    process = subprocess.Popen(
+        command,
+        cwd=copy,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        output, _ = process.communicate(timeout=limit)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)  # the workers of the tests, too
+        process.communicate()
+        return False
+    if printed and process.returncode:
+        print(output[-3000:])
+    return process.returncode == 0
+
+
+def main() -> int:
+    """Sample, test, and print what survived."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--samples", type=int, default=60, help="mutants over all packages")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--packages", nargs="+", choices=PACKAGES, default=PACKAGES)
+    given = parser.parse_args()
+    os.nice(10)
+    listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    files = subprocess.run(listed, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
+        copy = Path(folder)
+        for name in filter(None, files.split("\0")):
+            (copy / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(ROOT / name, copy / name)
+        noticed, survivors = 0, []
+        for package in given.packages:
+            began = time.monotonic()
+            if not passes(copy, f"tests/{package}", None, printed=True):
+                print(f"The unchanged code fails tests/{package}: no mutant was tried.")
+                return 2
+            limit = PATIENCE * (time.monotonic() - began) + 60
+            print(f"{package}: the unchanged code passes.", flush=True)
+            source = sample(random.Random(f"{given.seed} {package}"), package)  # noqa: S311 - no secret
+            for _ in range(given.samples // len(given.packages)):
+                path, line, name, changed = next(source)
+                before = (copy / path).read_text(encoding="utf-8")
+                (copy / path).write_text(changed, encoding="utf-8")
+                survived = all(passes(copy, tests, limit) for tests in stages(copy, path))
+                (copy / path).write_text(before, encoding="utf-8")
+                noticed += not survived
+                text = changed.splitlines()[line - 1].strip()
+                said = f"{'SURVIVED' if survived else 'noticed '} {path}:{line} {name}: {text}"
+                print(said, flush=True)
+                survivors += [said] if survived else []
+    tried = max(1, noticed + len(survivors))
+    print(f"\n{noticed} of {tried} noticed ({noticed / tried:.0%}), seed {given.seed}. Survivors:")
+    print("\n".join(survivors) or "none")
+    return int(noticed / tried < LEAST_SHARE)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
