@@ -136,7 +136,7 @@ class _Gltf:
             if scenes
             else [index for index in range(len(nodes)) if index not in children]
         )
-        placed = []
+        placed: list[tuple[dict[str, Any], FloatArray]] = []
         waiting = [(index, np.eye(4)) for index in reversed(roots)]
         visited: set[int] = set()  # nodes form trees; a file in which they do not must not hang
         while waiting:
@@ -177,7 +177,7 @@ class _Gltf:
         named = ("normalTexture", "occlusionTexture", "emissiveTexture")
         textures = [material.get("pbrMetallicRoughness", {}).get("baseColorTexture")]
         textures += [material.get(name) for name in named]
-        texture = next((item for item in textures if item), {})
+        texture: dict[str, Any] = next((item for item in textures if item), {})
         moved = texture.get("extensions", {}).get("KHR_texture_transform", {})
         name = f"TEXCOORD_{moved.get('texCoord', texture.get('texCoord', 0))}"
         if name not in primitive["attributes"]:
