@@ -197,7 +197,7 @@ LEARNED = Preset(
     area_weight=0.02,
     map_weight=2.0,
     jacobian_weight=1.0,
-    inverse_weight=0.3,
+    inverse_weight=1.0,
     optimizer="soap",
     learning_rate=1e-2,
 )
