@@ -51,6 +51,7 @@ DISPLAY: dict[str, tuple[str, str]] = {
     "automatic+slim": ("Automatic cut + SLIM", ""),
     "parapoint+slim": ("Computed cut + SLIM", ""),
     "computed": ("Computed map", ""),
+    "parapoint(preset=learned)": ("ParaPoint, our training", ""),
     "parapoint": ("ParaPoint", ""),
 }
 """Name of a method in print and, where its parameters do not say it, what it minimises.
@@ -150,7 +151,8 @@ def labels(rows: Iterable[ResultRow]) -> dict[tuple[str, str], Label]:
     found: dict[tuple[str, str], Label] = {}
     for key in keys:
         method = key[0]
-        name, fixed = DISPLAY.get(method, (method, ""))
+        preset = params[key].get("preset")
+        name, fixed = DISPLAY.get(f"{method}(preset={preset})", DISPLAY.get(method, (method, "")))
         siblings = [params[other] for other in keys if other[0] == method and other != key]
         differing = [
             entry

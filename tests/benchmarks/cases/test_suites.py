@@ -25,12 +25,12 @@ def test_cases_and_methods_exist(name):
 
 def test_the_suites():
     expected = {"smoke", "builtin", "paper", "disk", "closed", "genus", "cad", "wild", "scans"}
-    expected |= {"artist", "core", "ablation", "quality", "noise", "cuts", "neural"}
+    expected |= {"artist", "core", "ablation", "quality", "seeds", "noise", "cuts", "neural"}
     assert expected == set(SUITES)
     assert SUITES["builtin"].cases == tuple(BUILTIN)
     assert len(SUITES["paper"].cases) == 6
-    assert len(SUITES["quality"].cases) == 10
-    assert SUITES["quality"].seeds == (0, 1, 2)
+    assert len(SUITES["quality", "seeds"].cases) == 10
+    assert SUITES["quality", "seeds"].seeds == (0, 1, 2)
     assert set(SUITES["paper"].cases) | set(SUITES["disk"].cases) <= set(SUITES["core"].cases)
     in_a_set = [
         case
