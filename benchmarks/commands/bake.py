@@ -14,7 +14,6 @@ from typing import Any, NamedTuple, Protocol, cast
 
 import igl
 import numpy as np
-import numpy.typing as npt
 from rich.table import Table
 from scipy.spatial import cKDTree
 
@@ -24,7 +23,7 @@ from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.sampling import surface_sample
 from parapoint.surfaces.surface import FloatArray, Mesh, PointCloud
-from parapoint.textures.baking import baked
+from parapoint.textures.baking import Pixels, baked
 from parapoint.textures.placing import Placing
 from parapoint.textures.texels import texels
 
@@ -125,7 +124,7 @@ def wave_colours(points: FloatArray, waves: float) -> FloatArray:
     )
 
 
-def nearest_baked(charted: Charted, cloud: PointCloud, size: int) -> npt.NDArray[np.uint8]:
+def nearest_baked(charted: Charted, cloud: PointCloud, size: int) -> Pixels:
     """(size, size, 3) a texture with the colour of the nearest point at each texel."""
     shown = texels(charted, size)
     corners = charted.mesh.vertices[charted.mesh.faces[shown.faces]]
@@ -135,7 +134,7 @@ def nearest_baked(charted: Charted, cloud: PointCloud, size: int) -> npt.NDArray
     return pixels.reshape(size, size, 3)
 
 
-def looked_up(charted: Charted, texture: npt.NDArray[np.uint8], points: FloatArray) -> FloatArray:
+def looked_up(charted: Charted, texture: Pixels, points: FloatArray) -> FloatArray:
     """(N, 3) the texture, bilinearly, at the places of the mesh that are nearest to points."""
     mesh, held = charted
     _, face, place = igl.point_mesh_squared_distance(points, mesh.vertices, mesh.faces)
@@ -150,7 +149,7 @@ def looked_up(charted: Charted, texture: npt.NDArray[np.uint8], points: FloatArr
     for line in (0, 1):
         for column in (0, 1):
             weight = np.abs(1 - line - part[:, 0]) * np.abs(1 - column - part[:, 1])
-            row, place_in_row = np.clip(low + [line, column], 0, size - 1).T
+            row, place_in_row = np.clip(low + np.array([line, column]), 0, size - 1).T
             total = total + weight * texture[row, place_in_row]
     return np.asarray(total / 255)
 

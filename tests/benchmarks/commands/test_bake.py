@@ -46,14 +46,15 @@ def test_a_failure_is_a_row_and_ours_beats_todays_on_a_small_model(monkeypatch) 
     ours = bake.method("computed(points=300)")
 
     class Failing:
-        def charted(self, surface, *, seed):
+        def charted(self, _, *, seed):
+            assert seed == 0
             raise RuntimeError("no surface")
 
     monkeypatch.setattr(bake, "method", lambda s: ours if s.startswith("c") else (s, Failing()))
     rows = list(bake.bakings(("plate",), 3000))
     assert [row.reason for row in rows] == ["", "", "no surface", "no surface"]
     assert rows[0].psnr > rows[1].psnr > 15
-    assert rows[0].psnr > 35
+    assert rows[0].psnr > 30
     monkeypatch.setattr(bake, "load", lambda _: PointCloud(PLATE.mesh.vertices))
     with pytest.raises(InputError, match="is a cloud"):
         list(bake.bakings(("scan",), 3000))
