@@ -29,8 +29,8 @@ def test_the_suites():
     assert expected == set(SUITES)
     assert SUITES["builtin"].cases == tuple(BUILTIN)
     assert len(SUITES["paper"].cases) == 6
-    assert len(SUITES["quality", "seeds"].cases) == 10
-    assert SUITES["quality", "seeds"].seeds == (0, 1, 2)
+    assert len(SUITES["quality"].cases) == 10
+    assert SUITES["quality"].seeds == (0, 1, 2)
     assert set(SUITES["paper"].cases) | set(SUITES["disk"].cases) <= set(SUITES["core"].cases)
     in_a_set = [
         case
