@@ -48,6 +48,7 @@ DISPLAY: dict[str, tuple[str, str]] = {
     "artist+slim": ("Artist's cut + SLIM", ""),
     "automatic+slim": ("Automatic cut + SLIM", ""),
     "parapoint+slim": ("Computed cut + SLIM", ""),
+    "unwrap": ("Unwrap", ""),
     "computed": ("Computed map", ""),
     "parapoint": ("ParaPoint", ""),
 }

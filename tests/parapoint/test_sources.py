@@ -60,7 +60,7 @@ DEPENDENCIES = {
     "benchmarks/metrics/overlap.py": "benchmarks.metrics.table",
     "parapoint/files/pcd.py": "parapoint.files.reading",
     "parapoint/learned/losses.py": "parapoint.learned.parapoint",
-    "parapoint/computed/scale.py": "baselines.hybrid",
+    "parapoint/computed/scale.py": "parapoint.unwrapping.unwrap",
     "baselines/disks/tutte.py": "baselines.disks.slim",
     "reports/pictures/render.py": "reports.pictures.drawing",
 }
