@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, cast
 
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
-from parapoint.surfaces.cutting import cut_along, cut_to_disk
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh, Surface
 from parapoint.unwrapping.descent import Run, sound
-from parapoint.unwrapping.domains import check_iterations, check_triangles, domain
+from parapoint.unwrapping.domains import check_iterations, domain
+from parapoint.unwrapping.given import unwrapped_along
 from parapoint.unwrapping.growth import grow
-from parapoint.unwrapping.packing import by_component
 
 
 @dataclass(frozen=True)
@@ -83,22 +82,13 @@ class ArtistSLIM:
         """
         if not isinstance(surface, Mesh) or surface.seams is None:
             raise UnsupportedError("needs a mesh that came with a UV map")
-        completed = held = 0
-
-        def mapped(chart: Mesh) -> Parameterization:
-            nonlocal completed, held
-            check_triangles(chart.vertices, chart.faces)
-            if not chart.is_planar_domain:
-                chart, completed = cut_to_disk(chart), completed + 1
-            run = Run(chart)
-            run.begin(None)
-            run.improve(self.iterations)
-            held += run.held_steps
-            return Parameterization(run.uv, chart.faces)
-
-        result = by_component(cut_along(surface, surface.seams), mapped)
-        charts = int(result.charts().max()) + 1
-        report = {"charts": charts, "charts_cut_to_disks": completed, "held_steps": held}
+        result = unwrapped_along(surface, surface.seams, self.iterations)
+        parts = cast("list[dict[str, int]]", result.report["parts"])
+        report = {
+            "charts": int(result.charts().max()) + 1,
+            "charts_cut_to_disks": result.report["charts_cut_to_disks"],
+            "held_steps": sum(part["held_steps"] for part in parts),
+        }
         return Parameterization(result.uv, result.corners, report=report)
 
 

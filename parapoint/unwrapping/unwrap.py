@@ -11,14 +11,15 @@ from typing import ClassVar
 import numpy as np
 
 from parapoint.computed.computed_map import ComputedMap
+from parapoint.computed.reconstruction import ReconstructionError
 from parapoint.method import UnsupportedError
 from parapoint.parameters import check_number
-from parapoint.surfaces.cutting import cut_along, edge_lengths
+from parapoint.surfaces.cutting import cut_along, disk_cut, edge_lengths
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.preparation import prepared
 from parapoint.surfaces.sampling import FEWEST_VERTICES
 from parapoint.surfaces.spanning import learned_seam, unfolded
-from parapoint.surfaces.surface import BoolArray, Mesh, Surface
+from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, Surface
 from parapoint.unwrapping.descent import LEAST_ENERGY, Run, sound
 from parapoint.unwrapping.domains import FlatteningError, check_iterations
 from parapoint.unwrapping.growth import grow, grow_to
@@ -41,6 +42,8 @@ class Unwrap:
     itself is taken anew with the vertices that cross held where they are, so the map stays one to
     one. Then the seam grows to where the map is most distorted (X. Gu et al. 2002, "Geometry
     images"), as long as that pays, or until a bound on the energy is met.
+
+    Where no map can be computed, the automatic cut (`parapoint.surfaces.cutting`) stands for it.
 
     A disk, with or without holes, is cut only where that pays; where its map without a cut is so
     good that none could, no map is computed. Components are mapped one after another.
@@ -88,7 +91,6 @@ class Unwrap:
 
         Raises:
             UnsupportedError: no face has an area.
-            ReconstructionError: no map can be computed.
             FlatteningError: no start without flips was found.
         """
         preparation = prepared(mesh, self.requires)
@@ -114,7 +116,6 @@ class Unwrap:
         Raises:
             UnsupportedError: the surface is a point cloud.
             InputError: a triangle has no area.
-            ReconstructionError: no map can be computed.
             FlatteningError: no start without flips was found.
         """
         if not isinstance(surface, Mesh):
@@ -128,10 +129,23 @@ class Unwrap:
             return Parameterization(whole.uv, whole.mesh.faces, report=report)
         points = self.points or _enough_points(mesh, ComputedMap().points)
         budget = None if seconds is None else SHARE_OF_SEAM * seconds
-        learned = ComputedMap(points, time_budget=budget).parameterize(mesh, seed=seed)
-        seam = learned_seam(mesh, learned.uv)
-        run = Run(cut_along(mesh, mesh.edges[seam]), deadline)
-        run.begin(unfolded(mesh, learned.uv, run.mesh))
+        start: FloatArray | None = None
+        computed: dict[str, object]
+        try:
+            learned = ComputedMap(points, time_budget=budget).parameterize(mesh, seed=seed)
+        except ReconstructionError as error:
+            computed = {"failed": str(error)}
+            seam = np.zeros(len(mesh.edges), dtype=bool)
+            if not mesh.is_planar_domain:
+                seam = disk_cut(mesh)
+            disk = cut_along(mesh, mesh.edges[seam])
+        else:
+            computed = dict(learned.report)
+            seam = learned_seam(mesh, learned.uv)
+            disk = cut_along(mesh, mesh.edges[seam])
+            start = unfolded(mesh, learned.uv, disk)
+        run = Run(disk, deadline)
+        run.begin(start)
         run.improve(self.iterations)
         if self.price is not None:
             if whole is not None and whole.energy <= run.energy + self.price * _length(mesh, seam):
@@ -142,7 +156,7 @@ class Unwrap:
         report = {
             **run.report(),
             "learned_seam_edges": int(seam.sum()),
-            "computed": dict(learned.report),
+            "computed": computed,
         }
         return Parameterization(run.uv, run.mesh.faces, report=report)
 

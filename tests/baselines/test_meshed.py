@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from baselines.packing import by_component
 from numpy.testing import assert_allclose, assert_array_equal
 
 from baselines import registry
@@ -13,6 +12,7 @@ from parapoint.surfaces.preparation import prepared
 from parapoint.surfaces.surface import Mesh, PointCloud
 from parapoint.testing import irregular_disk
 from parapoint.unwrapping.domains import FlatteningError
+from parapoint.unwrapping.packing import by_component
 
 
 def half_cylinder(count=1000):
