@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from parapoint.commands.fitting import estimator_of, fitted, summary
-from parapoint.commands.output import TEXTURE, target, write
+from parapoint.commands.output import TEXTURE, preview_target, target, write
 from parapoint.errors import InputError
 from parapoint.files.reading import Polygons, read_polygons
 from parapoint.fitting import COMPONENTS
@@ -33,6 +33,7 @@ from parapoint.textures.baking import check_size
 @click.option("--per-vertex", is_flag=True, help="One uv for each vertex, whatever the seams.")
 @click.option("--texture", type=int, metavar="N", help="Texels along a side of a texture.")
 @click.option("--margin", type=int, metavar="TEXELS", help="Free texels around the map.")
+@click.option("--preview", metavar="FILE", help="FILE.png: the surface beside its layout.")
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--force", is_flag=True, help="Replace files of yours that are in the way.")
 @click.option("--json", "as_json", is_flag=True, help="Print the report as one JSON object.")
@@ -42,6 +43,7 @@ def unwrap(
     *,
     texture: int | None,
     margin: int | None,
+    preview: str | None,
     force: bool,
     as_json: bool,
     seams: str | None,
@@ -64,6 +66,7 @@ def unwrap(
     """
     out = target(out, surface, force=force, textured=texture is not None)
     check_size(TEXTURE if texture is None else texture, margin or 0)
+    picture = None if preview is None else preview_target(preview, out, surface, force=force)
     given = read_polygons(surface)
     if isinstance(given, Polygons):
         from parapoint.commands.unwrapping import Request, border_of, lines, unwrap_mesh
@@ -84,6 +87,7 @@ def unwrap(
             seams,
             settings["components"] == "largest",
             per_vertex,
+            picture,
         )
         facts = unwrap_mesh(given, request)
         print(json.dumps(facts) if as_json else lines(facts))
@@ -94,5 +98,5 @@ def unwrap(
             raise InputError(f"{option} is for meshes; {surface} is a point cloud")
     model = fitted(surface, given, estimator_of("computed", settings))
     written = components(given)[0] if model.components == "largest" else given
-    facts = write(model, written, out, texture, margin)
+    facts = write(model, written, out, texture=texture, margin=margin, preview=picture)
     print(json.dumps({**facts, **model.report_}) if as_json else f"{out}: {summary(model)}")

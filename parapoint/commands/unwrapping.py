@@ -21,6 +21,7 @@ from parapoint.surfaces.parameterization import Charted, Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, PointCloud
 from parapoint.textures.checkerboard import checkerboard
 from parapoint.textures.placing import BORDER, Placing
+from parapoint.textures.preview import write_preview
 from parapoint.unwrapping.domains import FlatteningError
 from parapoint.unwrapping.given import unwrapped_along
 from parapoint.unwrapping.quality import MOST_STARVED, Quality, quality
@@ -43,6 +44,7 @@ class Request:
         seams: file of the edges to cut along, or None for seams of the method's own.
         largest: whether the largest component alone is unwrapped and written.
         per_vertex: whether each vertex is to have one uv.
+        preview: a PNG file for a picture of the surface beside its layout, or None.
     """
 
     source: str
@@ -54,6 +56,7 @@ class Request:
     seams: str | None = None
     largest: bool = False
     per_vertex: bool = False
+    preview: Path | None = None
 
 
 def border_of(margin: int | None, texture: int) -> float:
@@ -93,6 +96,8 @@ def unwrap_mesh(given: Polygons, request: Request) -> dict[str, object]:
     facts["energy"] = round(max(float(str(part["end_energy"])) for part in parts), 4)
     facts["components"] = mesh.component_count
     facts |= _written(placed, places, given.extras, request)
+    if request.preview is not None:
+        write_preview(request.preview, placed, checkerboard())
     facts["seconds"] = round(time.perf_counter() - began, 1)
     _warn(found, facts, request)
     return facts

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from parapoint.files.decoding import plain
 from parapoint.files.targets import complete_file
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import IntArray
@@ -20,7 +21,7 @@ TEXTURED = re.compile(rb"^\s*(map_|bump|disp|decal|norm|refl)", re.MULTILINE | r
 def libraries(source: Path) -> tuple[list[Path], bool]:
     """The material libraries that an OBJ file names, and whether one of them names a picture."""
     found: list[Path] = []
-    for line in _lines(source.read_bytes()):
+    for line in _lines(plain(source.read_bytes())):
         words = line.split(None, 1)
         if len(words) == 2 and words[0] == b"mtllib":
             found.append(source.parent / words[1].strip().decode(errors="replace"))
@@ -64,7 +65,7 @@ def rewrite_obj(
     uv_lines = "".join(f"vt {u!r} {v!r}\n" for u, v in parameterization.uv.tolist()).encode()
     place = split = 0
     began = False
-    for line in _lines(source.read_bytes()):
+    for line in _lines(plain(source.read_bytes())):
         words = line.split(b"#", 1)[0].split()
         kind = words[0] if words else b""
         if kind == b"vt":

@@ -9,6 +9,7 @@ from parapoint.surfaces.spanning import MOST_PIECES, opened, spanning_edges
 from parapoint.testing import irregular_disk
 from parapoint.textures.checkerboard import checkerboard
 
+SHORT = ["--time-budget", "1"]
 TINY = ["--preset", "paper", "--points", "150", "--subset", "100", "--iterations", "4"]
 
 
