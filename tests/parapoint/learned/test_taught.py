@@ -193,3 +193,27 @@ def test_a_taught_model_comes_back_from_its_folder(
     assert_array_equal(again.transform(cap()), model.transform(cap()))
     uv = model.transform(cap())
     assert_array_equal(again.inverse_transform(uv), model.inverse_transform(uv))
+
+
+class KilledError(Exception):
+    pass
+
+
+def test_a_killed_fit_from_a_computed_start_goes_on_where_it_was(
+    monkeypatch: pytest.MonkeyPatch, tmp_path
+) -> None:
+    monkeypatch.setitem(parapoint.presets.PRESETS, "learned", TINY)
+    monkeypatch.setattr("parapoint.learned.checkpoint.CHECKPOINT_SECONDS", 0.0)
+
+    def kill(progress) -> None:
+        if progress.iteration == 5:
+            raise KilledError
+
+    model = ParaPoint(iterations=8, device="cpu")
+    whole = model.fit(cap()).transform(cap())
+    with pytest.raises(KilledError):
+        model.fit(cap(), checkpoint=tmp_path, callback=kill)
+    seen = []
+    model.fit(cap(), checkpoint=tmp_path, callback=lambda now: seen.append(now.iteration))
+    assert seen == [0, 6, 7, 8]  # the start is computed again
+    assert_array_equal(model.transform(cap()), whole)
