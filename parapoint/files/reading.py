@@ -12,6 +12,7 @@ import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from parapoint.files.content import NO_UV, Content
 from parapoint.files.decoding import plain
 from parapoint.files.gltf import glb, gltf
 from parapoint.files.las import las
+from parapoint.files.npz import npz
 from parapoint.files.obj import obj
 from parapoint.files.off import off
 from parapoint.files.pcd import pcd
@@ -27,7 +29,7 @@ from parapoint.files.ply import ply
 from parapoint.files.polygons import triangle_rows
 from parapoint.files.stl import stl
 from parapoint.files.xyz import pts, xyz
-from parapoint.surfaces.parameterization import Parameterization
+from parapoint.surfaces.parameterization import Parameterization, PointParameterization
 from parapoint.surfaces.surface import (
     BoolArray,
     FloatArray,
@@ -50,10 +52,11 @@ FORMATS: dict[str, Callable[[bytes, Path], Content]] = {
     ".pcd": lambda data, _: pcd(data),
     ".las": lambda data, _: las(data),
     ".laz": lambda data, _: las(data),
+    ".npz": lambda data, _: npz(data),
 }
 """Reader of each file name ending; it gets the bytes and the folder of the file."""
 
-UV_FORMATS = (".obj", ".glb", ".gltf")
+UV_FORMATS = (".obj", ".ply", ".glb", ".gltf", ".npz")
 
 logger = logging.getLogger("parapoint")
 
@@ -74,6 +77,41 @@ def read_surface(path: str | Path) -> Surface:
     with faults_of(path):
         content = _content(path)
         return _mesh(content)[0] if len(content.sizes) else _point_cloud(content, path)
+
+
+class Polygons(NamedTuple):
+    """A mesh and the polygons that it was read from.
+
+    Attributes:
+        mesh: its triangles.
+        places: (F, 3) for each corner of the triangles, its place among the polygons' corners.
+        extras: what else the file holds, in words: what a writer of the mesh alone leaves out.
+    """
+
+    mesh: Mesh
+    places: IntArray
+    extras: tuple[str, ...]
+
+
+def read_polygons(path: str | Path) -> Polygons | PointCloud:
+    """The mesh in a file with its polygons, or the cloud where the file has no faces.
+
+    Raises:
+        InputError: as for `read_surface`.
+    """
+    path = Path(path)
+    with faults_of(path):
+        content = _content(path)
+        if not len(content.sizes):
+            return _point_cloud(content, path)
+        mesh, places = _mesh(content)
+        extras = [
+            "normals" if content.normals is not None else "",
+            "old UVs" if content.uv is not None else "",
+            "polygons" if (content.sizes > 3).any() else "",
+            *content.attributes,
+        ]
+        return Polygons(mesh, places, tuple(name for name in extras if name))
 
 
 def read_parameterized(path: str | Path) -> tuple[Mesh, Parameterization]:
@@ -132,6 +170,36 @@ def faults_of(path: Path) -> Iterator[None]:
         raise InputError(f"{path}: is no {kind} file that can be read ({detail})") from error
 
 
+def read_point_map(path: str | Path) -> tuple[PointCloud, PointParameterization]:
+    """The points in a PLY (with u and v) or NPZ file (points, uv), and their map.
+
+    Raises:
+        InputError: as for `read_surface`; the file has faces or no UV; a row of them is neither
+            finite nor of two NaN.
+    """
+    path = Path(path)
+    with faults_of(path):
+        content = _content(path)
+        if len(content.sizes):
+            raise InputError("has faces; it is no point cloud")
+        uv = content.attributes.get("uv")
+        if uv is None and {"u", "v"} <= set(content.attributes):
+            uv = np.stack([content.attributes[name] for name in "uv"], axis=1)
+        if uv is None:
+            raise InputError("has no array 'uv'; a point map has points and uv")
+        return PointCloud(content.vertices), PointParameterization(uv)
+
+
+def has_faces(path: str | Path) -> bool:
+    """Whether a file holds a mesh.
+
+    Raises:
+        InputError: as for `read_surface`.
+    """
+    with faults_of(Path(path)):
+        return len(_content(Path(path)).sizes) > 0
+
+
 def _content(path: Path) -> Content:
     """What the file holds, by the reader of its ending."""
     reader = FORMATS.get(path.suffix.lower())
@@ -143,7 +211,8 @@ def _content(path: Path) -> Content:
         raise InputError(f"has an unknown ending; known are {', '.join(FORMATS)}")
     if not path.is_file():
         raise InputError("is not a regular file")
-    return reader(plain(path.read_bytes()), path.parent)
+    data = path.read_bytes()
+    return reader(data if path.suffix.lower() == ".npz" else plain(data), path.parent)
 
 
 def _mesh(content: Content) -> tuple[Mesh, IntArray]:
