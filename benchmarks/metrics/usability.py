@@ -181,4 +181,4 @@ def mirrored_area_fraction(layout: Layout) -> float:
     """Share of the UV area that turns against the faces of the mesh; 1 without any UV area."""
     uv_area = layout.triangles.uv_area
     total = float(np.abs(uv_area).sum())
-    return float(-uv_area[uv_area < 0].sum()) / total if total > 0 else 1.0
+    return float(np.abs(uv_area[uv_area < 0]).sum()) / total if total > 0 else 1.0
