@@ -9,8 +9,19 @@ import numpy.typing as npt
 import pandas as pd
 
 from baselines.disks.flattening import FlatteningError
+from parapoint.surfaces.frame import Frame
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
+
+UNIT = 100.0
+"""Radius of the meshes that libraries are given. Some of them work in single precision, and all
+have lengths built in below which they see no triangle."""
+
+
+def in_unit(vertices: FloatArray) -> FloatArray:
+    """Vertices (V, 3) around the origin, UNIT from it at most: what tools of float32 are given."""
+    frame = Frame.of(vertices)
+    return UNIT * frame.inside(vertices)
 
 
 def atlas(
