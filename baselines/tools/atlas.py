@@ -65,7 +65,13 @@ def atlas(
 
 
 def joined_corners(mesh: Mesh, uv: FloatArray) -> Parameterization:
-    """The map with one row for all corners that have the same vertex and the same uv (F, 3, 2)."""
+    """The map with one row for all corners that have the same vertex and the same uv (F, 3, 2).
+
+    Raises:
+        FlatteningError: uv is not finite.
+    """
+    if not np.isfinite(uv).all():
+        raise FlatteningError("the atlas has coordinates that are not finite")
     rows = uv.reshape(-1, 2)
     corners = row_numbers(mesh.faces.reshape(-1), rows @ [1, 1j])
     return Parameterization(rows[first_rows(corners)], corners.reshape(-1, 3))
