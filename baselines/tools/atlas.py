@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from baselines.disks.flattening import FlatteningError
 from parapoint.surfaces.frame import Frame
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
+from parapoint.unwrapping.domains import FlatteningError
 
 UNIT = 100.0
 """Radius of the meshes that libraries are given. Some of them work in single precision, and all

@@ -7,13 +7,13 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from baselines.disks.flattening import FlatteningError
 from baselines.tools.atlas import UNIT, atlas, in_unit
 from baselines.tools.optional import optional
 from parapoint.method import UnsupportedError
 from parapoint.surfaces.frame import Frame
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh, Surface
+from parapoint.unwrapping.domains import FlatteningError
 
 uvunwrap = optional("uvunwrap", "pip install uvunwrap")
 

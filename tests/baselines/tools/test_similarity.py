@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from baselines import registry
-from baselines.disks.flattening import FlatteningError
 from baselines.tools.atlas import UNIT, in_unit
 from parapoint.method import MissingError
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh
 from parapoint.testing import sphere
+from parapoint.unwrapping.domains import FlatteningError
 
 SIMILARITIES = [(5e5, 1.0), (6e6, 1.0), (0.0, 1e-6), (0.0, 1e6), (-7e5, 1e-3)]
 """Shifts, in sizes of the surface, and scales."""
