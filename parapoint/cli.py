@@ -1,4 +1,4 @@
-"""The command `parapoint`: fit | map | unwrap."""
+"""The command `parapoint`: fit | map | unwrap | bake."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Never
 import click
 
 from parapoint import console
+from parapoint.commands.bake import bake
 from parapoint.commands.fit import fit
 from parapoint.commands.map import map_
 from parapoint.commands.unwrap import unwrap
@@ -19,7 +20,7 @@ def parapoint() -> None:
     logging.basicConfig(format="%(message)s")
 
 
-for command in (fit, map_, unwrap):
+for command in (fit, map_, unwrap, bake):
     parapoint.add_command(command)
 
 

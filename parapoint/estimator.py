@@ -12,23 +12,24 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
 from parapoint import fitting, saving
 from parapoint.errors import InputError
 from parapoint.fitting import COMPONENTS, Fitted, Progress, Session, SurfaceMap
 from parapoint.parameters import check_choice, check_number, check_whole
 from parapoint.surfaces.frame import Frame
-from parapoint.surfaces.parameterization import Parameterization, PointParameterization, TracePoint
+from parapoint.surfaces.gridding import gridded
+from parapoint.surfaces.parameterization import (
+    Charted,
+    Parameterization,
+    PointParameterization,
+    TracePoint,
+)
+from parapoint.surfaces.seam_points import seam_points
 from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, PointCloud, Surface
 
 logger = logging.getLogger("parapoint")
 
-SEAM_NEIGHBOURS = 3
-"""K_cut of the paper: nearest points in space that are looked at from a point on a seam."""
-SEAM_THRESHOLD = 0.01
-"""T_cut of the paper: distance in the plane, as a share of the side of the map's square bounding
-box, beyond which one of these neighbours lies across a seam."""
 MOST_WATCHED = 50_000
 """Maps along the way are kept of surfaces of at most this many points."""
 ESTIMATORS = {
@@ -188,26 +189,35 @@ class Estimator(ABC):
         """
         return self._known().lift(coordinates(uv, 2))
 
-    def seams(self, points: npt.ArrayLike | Surface | None = None) -> BoolArray:
-        """(N,) whether each point lies on a cutting seam (paper, eq. "find-cut").
+    def mesh(self) -> Charted:
+        """The surface that the map describes, as a mesh with a map, both in the points' unit.
 
-        It does where one of its K_cut = 3 nearest points in space is farther from it in the plane
-        than T_cut = 1 % of the side of the map's square bounding box.
+        The triangulation that the map was computed on, where it was; otherwise a grid in the plane,
+        carried to the surface by `inverse_transform` (`parapoint.surfaces.gridding`).
+
+        Raises:
+            InputError: nothing is fitted.
+        """
+        fitted = self._known()
+        if (held := fitted.charted()) is not None:
+            return held
+        return gridded(fitted.flatten(fitted.points), fitted.lift)
+
+    def seams(
+        self, points: npt.ArrayLike | Surface | None = None, *, rule: str = "stretch"
+    ) -> BoolArray:
+        """(N,) whether each point lies on a cutting seam; see `parapoint.surfaces.seam_points`.
 
         Args:
             points: (N, 3) points; the fitted points by default.
+            rule: "stretch", which holds at any density, or "paper", for the paper's 10,000 points.
 
         Raises:
-            InputError: the points are not as said, fewer than four, or nothing is fitted.
+            InputError: the points are not as said, fewer than four, or nothing is fitted; there is
+                no such rule.
         """
         at = self.points_ if points is None else coordinates(points, 3)
-        if len(at) <= SEAM_NEIGHBOURS:
-            raise InputError(f"seams need more than {SEAM_NEIGHBOURS} points, not {len(at)}")
-        uv = self.transform(at)
-        near = cKDTree(at).query(at, SEAM_NEIGHBOURS + 1, workers=-1)[1][:, 1:]
-        apart = np.max([np.linalg.norm(uv - uv[column], axis=1) for column in near.T], axis=0)
-        side = np.ptp(uv, axis=0).max()
-        return np.asarray(apart > SEAM_THRESHOLD * side)
+        return seam_points(at, self.transform(at), rule)
 
     def parameterize(
         self, surface: Surface, *, seed: int

@@ -17,7 +17,7 @@ import numpy as np
 
 from parapoint.surfaces.components import components
 from parapoint.surfaces.frame import Frame
-from parapoint.surfaces.parameterization import TracePoint
+from parapoint.surfaces.parameterization import Charted, Parameterization, TracePoint
 from parapoint.surfaces.sampling import rows_left_out
 from parapoint.surfaces.surface import FloatArray, Mesh, Surface
 
@@ -37,6 +37,10 @@ class SurfaceMap(Protocol):
 
     def lift(self, uv: FloatArray) -> FloatArray:
         """(N, 2) points of the plane → (N, 3) points of the surface."""
+        ...
+
+    def charted(self) -> Charted | None:
+        """The mesh that the map was computed on, in the frame, with its map; None without one."""
         ...
 
     def arrays(self) -> dict[str, np.ndarray]:
@@ -73,6 +77,16 @@ class Fitted:
     def lift(self, uv: FloatArray) -> FloatArray:
         """(N, 2) points of the plane → (N, 3) points, both in the surface's unit."""
         return self.frame.outside(self.map.lift(uv / self.frame.scale))
+
+    def charted(self) -> Charted | None:
+        """The mesh that the map was computed on, with its map, both in the surface's unit."""
+        return None if (held := self.map.charted()) is None else placed(held, self.frame)
+
+
+def placed(charted: Charted, frame: Frame) -> Charted:
+    """A mesh and its map in a frame → both in the surface's unit, the mesh in its place."""
+    mesh = Mesh(frame.outside(charted.mesh.vertices), charted.mesh.faces)
+    return Charted(mesh, Parameterization(charted.map.uv * frame.scale, charted.map.corners))
 
 
 class Progress(NamedTuple):

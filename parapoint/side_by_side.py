@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from parapoint.fitting import Fitted, SurfaceMap
+from parapoint.fitting import Fitted, SurfaceMap, placed
 from parapoint.surfaces.frame import IDENTITY, Frame
-from parapoint.surfaces.surface import FloatArray, IntArray
+from parapoint.surfaces.parameterization import Charted, Parameterization
+from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 
 GAP = 0.02
 """Distance between neighbouring charts, in widths of the widest."""
@@ -65,6 +66,16 @@ class SideBySide:
             points[mine] = frame.outside(of.lift((uv[mine] - self.shift[k]) / frame.scale))
         return points
 
+    def charted(self) -> Charted | None:
+        """See `SurfaceMap`."""
+        parts = []
+        for of, frame, shift in zip(self.maps, self.frames, self.shift, strict=True):
+            if (held := of.charted()) is None:
+                return None
+            mesh, own = placed(held, frame)
+            parts.append(Charted(mesh, Parameterization(own.uv + shift, own.corners)))
+        return joined(parts)
+
     def arrays(self) -> dict[str, np.ndarray]:
         """See `SurfaceMap`."""
         own = {name: getattr(self, name) for name in ("points", "label", "shift", "low", "high")}
@@ -89,6 +100,22 @@ class SideBySide:
         }
 
 
+def joined(parts: Sequence[Charted]) -> Charted:
+    """Several meshes with their maps as one."""
+    faces, corners = [], []
+    vertex_count = uv_count = 0
+    for mesh, own in parts:
+        faces.append(mesh.faces + vertex_count)
+        corners.append(own.corners + uv_count)
+        vertex_count += len(mesh.vertices)
+        uv_count += len(own.uv)
+    vertices = np.concatenate([mesh.vertices for mesh, _ in parts])
+    uv = np.concatenate([own.uv for _, own in parts])
+    return Charted(
+        Mesh(vertices, np.concatenate(faces)), Parameterization(uv, np.concatenate(corners))
+    )
+
+
 def side_by_side(parts: Sequence[Fitted]) -> Fitted:
     """One fitted map of the components of a surface.
 
@@ -102,7 +129,7 @@ def side_by_side(parts: Sequence[Fitted]) -> Fitted:
     places = np.stack([np.cumsum(width) - width, np.zeros(len(parts))], axis=1)
     points = np.concatenate([part.points for part in parts])
     label = np.repeat(np.arange(len(parts)), [len(part.points) for part in parts])
-    joined = SideBySide(
+    whole = SideBySide(
         [part.map for part in parts],
         [part.frame for part in parts],
         points,
@@ -120,4 +147,4 @@ def side_by_side(parts: Sequence[Fitted]) -> Fitted:
     }
     if "iterations" in report:
         report["iterations"] = sum(int(str(of["iterations"])) for of in reports)
-    return Fitted(joined, IDENTITY, points, parts[0].trace, report)
+    return Fitted(whole, IDENTITY, points, parts[0].trace, report)

@@ -13,6 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from benchmarks.metrics import table as metrics
+from benchmarks.metrics.grades import BOUNDS, grade
 from benchmarks.metrics.table import GROUPS, METRICS, WITHOUT_SPANNING, MapState
 from parapoint.errors import InputError
 from parapoint.files.reading import faults_of, read_parameterized
@@ -37,7 +38,7 @@ WIDTH = 160
     "--heatmap", type=click.Path(path_type=Path), metavar="OUT.png", help="Draw the distortion."
 )
 def score(file: Path, *, reference: Path | None, as_json: bool, heatmap: Path | None) -> None:
-    """Every metric of the UV map in FILE: OBJ with vt, GLB, or a point cloud's NPZ (points, uv).
+    """Grade and metrics of the UV map in FILE: OBJ with vt, GLB, or a cloud's NPZ (points, uv).
 
     Polygons are triangulated first; faces are the triangles, numbered from 0 in the file's order.
     JSON has no infinity: an infinite value is the string "inf".
@@ -58,13 +59,15 @@ def score(file: Path, *, reference: Path | None, as_json: bool, heatmap: Path | 
             from benchmarks.commands.heatmap import write_heatmap
 
             write_heatmap(state, heatmap, title=file.name)
+    found = grade(values, of_cloud=state is None)
     if as_json:
-        print(json.dumps(json_values(values), allow_nan=False))
+        print(json.dumps({"grade": found, **json_values(values)}, allow_nan=False))
         return
     console = Console()
     if not console.is_terminal:
         console = Console(width=WIDTH)
     console.print(Text(title, style="bold"))
+    console.print(Text(f"grade: {found} ({BOUNDS})"))
     for table in tables(values):
         console.print(table)
     if state is not None:
@@ -128,7 +131,8 @@ def summary(state: MapState) -> str:
     distortion = state.distortion
     middle = float(np.median(distortion.quasi_conformal)) if len(distortion.faces) else np.inf
     faces, topology = len(state.mesh.faces), state.mesh.topology
-    return f"{faces:,} faces, surface: {topology}; median σ1/σ2 {middle:.4g}"
+    welded = f"; {state.welded:,} doubled vertices welded" if state.welded else ""
+    return f"{faces:,} faces, surface: {topology}{welded}; median σ1/σ2 {middle:.4g}"
 
 
 def tables(values: dict[str, float]) -> list[Table]:

@@ -10,10 +10,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
 from benchmarks.metrics.distortion import mean, power_of_two
 from benchmarks.metrics.seams import QUARTILE, SPANNING_LENGTH, SPANNING_STRETCH, square_side
+from benchmarks.metrics.usability import LEAST_PART, STARVED
 from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import PointParameterization
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, PointCloud
@@ -30,12 +33,14 @@ class PointMap:
     """What the point-cloud metrics read; both sets of coordinates are scaled by powers of two.
 
     Attributes:
-        points: (P, 3) points.
+        points: (P, 3) points that the map has a place for.
         uv: (P, 2) their images.
+        coverage: share of all points, from 0 to 1, that these are.
     """
 
     points: FloatArray
     uv: FloatArray
+    coverage: float = 1.0
 
     @cached_property
     def tree(self) -> cKDTree:
@@ -107,7 +112,11 @@ def point_map(cloud: PointCloud, parameterization: PointParameterization) -> Poi
         raise InputError(f"{len(uv)} uv rows for a cloud of {len(points)} points")
     if len(points) < 4:
         raise InputError(f"a cloud of {len(points)} points has no neighbourhoods; 4 are needed")
-    return PointMap(points / power_of_two(points), uv / power_of_two(uv))
+    covered = parameterization.covered
+    if covered.sum() < 4:
+        raise InputError(f"the map has a place for {covered.sum()} points; 4 are needed")
+    points, uv, share = points[covered], uv[covered], float(covered.mean())
+    return PointMap(points / power_of_two(points), uv / power_of_two(uv), share)
 
 
 def nearest_others(tree: cKDTree, k: int) -> IntArray:
@@ -154,6 +163,40 @@ def _area_log_ratio(point_map: PointMap) -> FloatArray:
     # Without areas there is no total to scale by; the median of the logarithms stands for it.
     ratio[known] = np.abs(log - np.median(log)) if known.any() else log
     return ratio
+
+
+def _local_ratio(point_map: PointMap) -> FloatArray:
+    """(P,) local area, sigma1 sigma2, over its mean; nan where the neighbourhood spans no plane."""
+    larger, smaller = point_map.singular_values.T
+    area = np.where(larger > 0, larger * smaller, np.nan)
+    total = np.nanmean(area) if (larger > 0).any() else 0.0
+    return area / total if total > 0 else np.full(len(area), np.nan)
+
+
+def starved_point_fraction(point_map: PointMap) -> float:
+    """Fraction of points whose local area is below a quarter of the mean."""
+    return float((_local_ratio(point_map) < STARVED).mean())
+
+
+def point_part_area_ratio_min(point_map: PointMap) -> float:
+    """Smallest mean ratio of a connected part of starved points that holds 1 %; 1 for none.
+
+    Points connect to their nearest neighbours in space.
+    """
+    ratio = _local_ratio(point_map)
+    starved = ratio < STARVED
+    if not starved.any():
+        return 1.0
+    near = point_map.neighbours
+    start, end = np.repeat(np.arange(len(ratio)), near.shape[1]), near.reshape(-1)
+    kept = starved[start] & starved[end]
+    links = sparse.coo_matrix(
+        (np.ones(kept.sum(), bool), (start[kept], end[kept])), [len(ratio)] * 2
+    )
+    label = csgraph.connected_components(links, directed=False)[1][starved]
+    count, total = np.bincount(label), np.bincount(label, ratio[starved])
+    large = count >= max(LEAST_PART * len(ratio), 1)
+    return float((total[large] / count[large]).min(initial=1.0))
 
 
 def neighbour_trustworthiness(point_map: PointMap) -> float:

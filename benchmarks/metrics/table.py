@@ -9,26 +9,30 @@ the faces that span no seam (`benchmarks.metrics.seams`), normalized over these 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, Literal
 
 import numpy as np
 
-from benchmarks.metrics import distortion, pointwise, seams, validity
+from benchmarks.metrics import distortion, pointwise, seams, usability, validity
 from benchmarks.metrics.distortion import FaceDistortion, Triangles, face_distortion, triangles
+from benchmarks.metrics.welding import scored
 from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization
 from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, PointCloud
 
 WITHOUT_SPANNING = "_without_spanning"
 
-Group = Literal["conformal", "authalic", "isometric", "validity", "seams", "reference", "points"]
+Group = Literal[
+    "conformal", "authalic", "isometric", "validity", "use", "seams", "reference", "points"
+]
 GROUPS: dict[Group, str] = {
     "conformal": "angles",
     "authalic": "areas",
     "isometric": "lengths",
     "validity": "flipped, degenerate and overlapping faces",
+    "use": "the worst part, and what a texture needs",
     "seams": "seams, charts, packing",
     "reference": "against the reference map",
     "points": "point cloud, no mesh",
@@ -75,10 +79,14 @@ class Metric:
 class MapState:
     """A map with all that more than one metric needs, each computed once and when asked for.
 
+    Faces that the map leaves out (NaN) are left out here too, and vertices at one place are welded.
+
     Attributes:
         mesh: the surface.
         parameterization: the map.
         reference: another map of the same faces, or None.
+        coverage: share of the surface, from 0 to 1, that the map covers.
+        welded: number of vertices that lie where another one does.
 
     Raises:
         InputError: a map has another number of faces than the mesh.
@@ -87,6 +95,8 @@ class MapState:
     mesh: Mesh
     parameterization: Parameterization
     reference: Parameterization | None = None
+    coverage: float = field(init=False, default=1.0)
+    welded: int = field(init=False, default=0)
 
     def __post_init__(self) -> None:
         for name, of in (("map", self.parameterization), ("reference", self.reference)):
@@ -95,6 +105,9 @@ class MapState:
                     f"the {name} has {len(of.corners)} faces, the mesh {len(self.mesh.faces)}; "
                     "both must have the same faces in the same order"
                 )
+        found = scored(self.mesh, self.parameterization, self.reference)
+        for name, value in found._asdict().items():
+            object.__setattr__(self, name, value)
 
     @cached_property
     def triangles(self) -> Triangles:
@@ -130,6 +143,23 @@ class MapState:
         return validity.Validity(self.parameterization, self.triangles)
 
     @cached_property
+    def worst(self) -> usability.Worst:
+        """State of the metrics of starved parts."""
+        return usability.Worst(self.mesh, self.distortion)
+
+    @cached_property
+    def worst_without_spanning(self) -> usability.Worst:
+        """The same over the faces that span no seam."""
+        if not self.spanning.any():
+            return self.worst
+        return usability.Worst(self.mesh, self.distortion_without_spanning)
+
+    @cached_property
+    def layout(self) -> usability.Layout:
+        """State of the metrics of the seam's shape and of the unit square."""
+        return usability.Layout(self.mesh, self.parameterization, self.triangles)
+
+    @cached_property
     def seams(self) -> seams.Seams:
         """State of the metrics of seams, charts and packing."""
         return seams.Seams(self.mesh, self.parameterization, self.triangles, self.validity.overlaps)
@@ -144,6 +174,11 @@ class MapState:
         if self.reference is None:
             raise InputError("this metric needs a reference map")
         return MapState(self.mesh, self.reference)
+
+
+def coverage(state: MapState | pointwise.PointMap) -> float:
+    """Share of the surface's area (of a cloud: of its points) that has a uv, from 0 to 1."""
+    return state.coverage
 
 
 def spanning_fraction(state: MapState) -> float:
@@ -217,6 +252,27 @@ def _of_validity_twice(
     """A metric of that name over all faces, and over those that span no seam."""
     (everywhere,) = _of_validity(function, label, **about)
     return _twice(everywhere, lambda state: function(state.validity_without_spanning))
+
+
+def _of_worst(
+    function: Callable[[usability.Worst], float], label: str, **about: Any
+) -> list[Metric]:
+    """A metric of that name over all faces, and over those that span no seam."""
+    everywhere = Metric(
+        name=function.__name__,
+        label=label,
+        group="use",
+        function=lambda state: function(state.worst),
+        **about,
+    )
+    return _twice(everywhere, lambda state: function(state.worst_without_spanning))
+
+
+def _of_layout(
+    function: Callable[[usability.Layout], float], label: str, **about: Any
+) -> list[Metric]:
+    name, of = function.__name__, lambda state: function(state.layout)
+    return [Metric(name=name, label=label, group="use", function=of, **about)]
 
 
 def _of_seams(function: Callable[[seams.Seams], float], label: str, **about: Any) -> list[Metric]:
@@ -343,6 +399,13 @@ def _validity() -> list[Metric]:
             normalization="min(p, 1 - p) of the clockwise fraction p",
         ),
         *twice(
+            v.flipped_area_fraction,
+            "flipped area",
+            **_AREA,
+            source="this project",
+            normalization="fraction of the 3D area, by chart majority",
+        ),
+        *twice(
             v.flipped_uv_area_fraction,
             "flipped UV area",
             weighting="UV area",
@@ -377,6 +440,69 @@ def _validity() -> list[Metric]:
             "bijective",
             **_FACES,
             normalization="1 yes, 0 no",
+            better="higher",
+            ideal=1.0,
+        ),
+    ]
+
+
+def _use() -> list[Metric]:
+    worst, layout, u = _of_worst, _of_layout, usability
+    ratio = {"normalization": "r = a/A, areas sum to 1"}
+    return [
+        *worst(
+            u.part_area_ratio_min,
+            "smallest mean r of a starved part",
+            **_AREA,
+            source="this project",
+            normalization="r = a/A; parts with r < 1/4 of at least 1 % of the area; 1 for none",
+            better="higher",
+            ideal=1.0,
+        ),
+        *worst(
+            u.starved_area_fraction,
+            "starved area",
+            **_AREA,
+            source="this project",
+            normalization="fraction of the 3D area with r = a/A < 1/4",
+        ),
+        *worst(
+            u.area_ratio_p01,
+            "r, 1st percentile",
+            **_AREA | ratio,
+            source="this project",
+            better="higher",
+            ideal=1.0,
+        ),
+        *layout(
+            u.seam_jaggedness,
+            "seam jaggedness",
+            weighting="3D length",
+            source="this project",
+            normalization="length / length smoothed over four edges",
+            ideal=1.0,
+        ),
+        *layout(
+            u.uv_outside_unit,
+            "UV outside of the unit square",
+            **_LARGEST,
+            source="this project",
+            normalization="sides of the square",
+        ),
+        *layout(
+            u.mirrored_area_fraction,
+            "mirrored UV area",
+            weighting="UV area",
+            source="this project",
+            normalization="fraction of the UV area that turns against the faces",
+        ),
+        _of_map(
+            "use",
+            coverage,
+            "coverage",
+            **_AREA,
+            source="this project",
+            normalization="fraction of the area (of a cloud: of the points) with a uv",
             better="higher",
             ideal=1.0,
         ),
@@ -463,6 +589,18 @@ def _points() -> list[Metric]:
         ),
         of(p.neighbour_trustworthiness, "trustworthiness", **_RANKS, normalization="k = 8"),
         of(p.neighbour_continuity, "continuity", **_RANKS, normalization="k = 8"),
+        of(
+            p.point_part_area_ratio_min,
+            "smallest mean r of a starved part",
+            **_POINTS | {"better": "higher", "ideal": 1.0},
+            normalization="r = local area / mean; parts with r < 1/4 of 1 % of the points",
+        ),
+        of(
+            p.starved_point_fraction,
+            "starved points",
+            **_POINTS,
+            normalization="fraction with a local area below a quarter of the mean",
+        ),
         of(p.uv_collision_fraction, "UV collisions", **share),
         of(
             p.seam_point_fraction,
@@ -481,6 +619,7 @@ METRICS: dict[str, Metric] = {
         *_authalic(),
         *_isometric(),
         *_validity(),
+        *_use(),
         *_seams(),
         *_reference(),
         *_points(),
@@ -517,10 +656,11 @@ def values(state: MapState) -> dict[str, float]:
 
 
 def evaluate_points(cloud: PointCloud, parameterization: PointParameterization) -> dict[str, float]:
-    """Every metric of the group "points", by name; never nan.
+    """Every metric of the group "points", and `coverage`, by name; never nan.
 
     Raises:
         InputError: the numbers of points differ, or there are fewer than four.
     """
     state = pointwise.point_map(cloud, parameterization)
-    return {m.name: m.function(state) for m in METRICS.values() if m.group == "points"}
+    of_points = [metric for metric in METRICS.values() if metric.group == "points"]
+    return {m.name: m.function(state) for m in (*of_points, METRICS["coverage"])}

@@ -65,8 +65,8 @@ class Validity:
         forward = (corners < np.roll(corners, -1, axis=1)).reshape(-1)
         alike = np.bincount(image.edge_of_halfedge, forward) == 1
         turn = np.ones(len(corners), dtype=np.int64)
-        if not alike[image.edge_face_count == 2].all():
-            faces = np.flatnonzero(self.triangles.sign)  # others may name a row twice
+        faces = np.flatnonzero(self.triangles.sign)  # others may name a row twice
+        if len(faces) and not alike[image.edge_face_count == 2].all():
             turned, _ = igl.bfs_orient(corners[faces])
             turn[faces[(turned != corners[faces]).any(axis=1)]] = -1
         return turn
@@ -86,6 +86,13 @@ def flipped_fraction_global(validity: Validity) -> float:
     """min(p, 1 - p) for the fraction p of faces with clockwise image (Shay et al.)."""
     clockwise = float((validity.triangles.sign < 0).mean())
     return min(clockwise, 1 - clockwise)
+
+
+def flipped_area_fraction(validity: Validity) -> float:
+    """3D area fraction of the faces that are flipped within their chart."""
+    area = validity.triangles.area
+    total = float(area.sum())
+    return float(area[validity.flipped].sum()) / total if total > 0 else 0.0
 
 
 def flipped_uv_area_fraction(validity: Validity) -> float:

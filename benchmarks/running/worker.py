@@ -299,8 +299,10 @@ def _measured(job: dict[str, Any]) -> Outcome:
 def fault(surface: Surface, result: object) -> str:
     """What is wrong with `result` as a map of `surface`; "" if nothing is.
 
-    The types themselves have checked shapes, indices and that all is finite.
+    The types themselves have checked shapes and indices, and that a uv is finite or NaN.
     """
+    if isinstance(result, Parameterization | PointParameterization) and not result.covered.any():
+        return "the map has no place for anything: every uv is NaN"
     if isinstance(surface, Mesh):
         if not isinstance(result, Parameterization):
             return f"returned {type(result).__name__} for a mesh; it must be a Parameterization"

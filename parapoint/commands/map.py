@@ -23,8 +23,8 @@ def map_(model: str, surface: str, out: str, device: str, *, force: bool, as_jso
     The fitted points fill the unit square. A mesh written as OBJ is cut along the seams of the
     map: a face that lies across one keeps its shape and stays on one side.
     """
-    out = target(out, surface, force=force)
+    out = target(out, surface, force=force, textured=False)
     from parapoint.estimator import load
 
-    facts = write(load(model, device=device), read_surface(surface), out, None)
+    facts = write(load(model, device=device), read_surface(surface), out)
     print(json.dumps(facts) if as_json else f"{out}: {facts['mapped_points']} points mapped")

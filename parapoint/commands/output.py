@@ -5,28 +5,36 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from parapoint.errors import InputError
 from parapoint.estimator import Estimator
-from parapoint.files.mesh_writers import write_obj
+from parapoint.files.mesh_writers import write_textured
 from parapoint.files.point_writers import write_points
 from parapoint.files.targets import checked_target
+from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.sampling import mean_spacing
 from parapoint.surfaces.spanning import Transform, opened, spanning_edges
 from parapoint.surfaces.surface import Mesh, PointCloud, Surface
+from parapoint.textures.baking import MARGIN, baked
+from parapoint.textures.checkerboard import checkerboard
+from parapoint.textures.placing import BORDER, Placing
 
-ENDINGS = (".obj", ".ply", ".npz")
+ENDINGS = (".obj", ".glb", ".ply", ".npz")
 """Endings of files that a map can be written to."""
+SIDES = {".obj": (".mtl", ".png"), ".ply": (".png",)}
+"""Endings of the files beside a textured mesh."""
+TEXTURE = 2048
+"""Texels along a side of a texture, if none were asked for."""
 
 
-def target(out: str, surface: str, *, force: bool) -> str:
+def target(out: str, surface: str, *, force: bool, textured: bool) -> str:
     """The file to write for `out`, checked before any work (`parapoint.files.targets`).
 
     Args:
         out: the file that the user named.
         surface: the file that is read.
         force: replace whatever is there.
+        textured: whether a texture was asked for.
 
     Raises:
         InputError: its ending is none of ENDINGS, or it cannot or may not be written.
@@ -34,31 +42,57 @@ def target(out: str, surface: str, *, force: bool) -> str:
     ending = Path(out).suffix.lower()
     if ending not in ENDINGS:
         raise InputError(f"{out}: cannot write this ending; take {', '.join(ENDINGS)}")
-    sides = (".mtl", ".png") if ending == ".obj" else ()
+    sides = SIDES.get(ending, ()) if textured or ending == ".obj" else ()
     return str(checked_target(out, sides=sides, inputs=[surface], force=force))
 
 
 def write(
-    model: Estimator, surface: Surface, out: str, texture: npt.NDArray[np.uint8] | None
+    model: Estimator,
+    surface: Surface,
+    out: str,
+    texture: int | None = None,
+    margin: int | None = None,
 ) -> dict[str, object]:
-    """Map a surface into the unit square and write it; what was written, as facts."""
+    """Map a surface into the unit square and write it; what was written, as facts.
+
+    Args:
+        model: the fitted model.
+        surface: a mesh, which is written with its map; or a cloud, whose points are written with
+            theirs, or whose colours are baked into the texture of the model's mesh.
+        out: the file.
+        texture: texels along a side of a texture, or None; .glb has one always.
+        margin: texels around the map and its charts; 1 / 256 of the side if None.
+    """
+    ending = Path(out).suffix.lower()
+    size = texture or TEXTURE
+    charted = model.mesh()
+    placing = Placing.smallest(charted.map.uv, BORDER if margin is None else margin / size)
     points = surface.vertices if isinstance(surface, Mesh) else surface.points
-    transform = _in_unit_square(model)
-    uv = transform(points)
     facts: dict[str, object] = {"file": out, "mapped_points": len(points)}
-    if isinstance(surface, Mesh) and Path(out).suffix.lower() == ".obj":
+    if ending == ".npz" or (ending == ".ply" and texture is None):
+        cloud = surface if isinstance(surface, PointCloud) else PointCloud(points)
+        write_points(out, cloud, _then(model, placing)(points))
+    elif isinstance(surface, Mesh):
+        transform = _then(model, placing)
+        uv = transform(points)
         spans = spanning_edges(surface, uv, transform, mean_spacing(model.points_))
         parameterization = opened(surface, uv, spans)
         facts["spanning_faces"] = int((parameterization.corners != surface.faces).any(1).sum())
-        write_obj(out, surface, parameterization, texture)
+        write_textured(out, Charted(surface, parameterization), checkerboard())
+    elif ending == ".obj" and texture is None:
+        write_points(out, surface, _then(model, placing)(points))
     else:
-        cloud = surface if isinstance(surface, PointCloud) else PointCloud(points)
-        write_points(out, cloud, uv)
+        placed = placing.of(charted)
+        facts |= {"faces": len(charted.mesh.faces), "texture": size}
+        pixels = checkerboard(pixels=max(1, size // 32))
+        if "colours" in surface.attributes:
+            made = baked(placed, surface, "colour", size, MARGIN if margin is None else margin)
+            pixels = made.pixels.astype(np.uint8, copy=False)
+            facts["texture_fill"] = round(made.fill, 3)
+        write_textured(out, placed, pixels)
     return facts
 
 
-def _in_unit_square(model: Estimator) -> Transform:
-    """The model's map, scaled so that the images of the fitted points fill the unit square."""
-    known = model.transform(model.points_)
-    low, side = known.min(axis=0), np.ptp(known, axis=0).max()
-    return lambda points: np.asarray((model.transform(points) - low) / side)
+def _then(model: Estimator, placing: Placing) -> Transform:
+    """The model's map, carried into the unit square."""
+    return lambda points: placing(model.transform(points))

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from parapoint.computed.flattening import FlatMap, flat_map
 from parapoint.computed.interpolation import Anchors, InterpolatedMap
@@ -18,7 +19,7 @@ from parapoint.fitting import Fitted, Progress, Session
 from parapoint.parameters import check_whole
 from parapoint.surfaces.frame import Frame
 from parapoint.surfaces.sampling import FEWEST_POINTS, training_points, without_coincident
-from parapoint.surfaces.surface import FloatArray, Surface
+from parapoint.surfaces.surface import FloatArray, PointCloud, Surface, vertex_normals
 
 logger = logging.getLogger("parapoint")
 
@@ -92,7 +93,7 @@ class ComputedMap(Estimator):
         else:
             few = min(count, max(FEWEST_POINTS, round(TRIAL_PER_SECOND * budget)))
             drawn = _computed_within(surface, few, count, self.seed, deadline)
-        flat, cloud = drawn.flat, drawn.cloud
+        flat, cloud = _as_the_normals(drawn.flat, drawn, surface), drawn.cloud
         if missing := len(cloud) - len(flat.anchors):
             logger.warning(
                 "%d of %d points are not on the surface that was found", missing, len(cloud)
@@ -103,7 +104,7 @@ class ComputedMap(Estimator):
                 "the time was up before the map was at its best; it is of %d points", len(cloud)
             )
         anchors = Anchors(cloud[flat.anchors], flat.uv, flat.jacobians)
-        held = InterpolatedMap.of(anchors, flat.inverse_jacobians)
+        held = InterpolatedMap.of(anchors, flat.inverse_jacobians, flat.charted)
         report: dict[str, object] = {
             "points": len(drawn.points),
             "anchors": len(flat.anchors),
@@ -128,6 +129,15 @@ class _Drawn(NamedTuple):
     frame: Frame
     cloud: FloatArray
     flat: FlatMap
+
+
+def _as_the_normals(flat: FlatMap, drawn: _Drawn, surface: Surface) -> FlatMap:
+    """The map as seen from where the normals of a cloud point, if it has any."""
+    if not isinstance(surface, PointCloud) or surface.normals is None:
+        return flat
+    near = cKDTree(surface.points).query(drawn.frame.outside(flat.charted.mesh.vertices))[1]
+    agreement = (vertex_normals(flat.charted.mesh) * surface.normals[near]).sum(axis=1)
+    return flat.turned() if agreement.sum() < 0 else flat
 
 
 def _computed(surface: Surface, count: int, seed: int, deadline: float) -> _Drawn:

@@ -22,6 +22,7 @@ from parapoint.computed.layout import scaled_layout
 from parapoint.computed.reconstruction import ReconstructionError, defects, triangulation
 from parapoint.computed.scale import area_discrepancy, even_scale, log_scale, mapped_areas, turning
 from parapoint.surfaces.cutting import cut_along, cut_to_disk
+from parapoint.surfaces.parameterization import Charted, Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 
 AREA_DISCREPANCY = 0.6
@@ -54,6 +55,7 @@ class FlatMap(NamedTuple):
         inverse_jacobians: (A, 3, 2) d x / d uv.
         facts: what was found, for reports: genus and boundary loops of the triangulation, faces,
             seam edges, whether it is of the denoised points.
+        charted: the whole triangulation, with both sides of its seams.
     """
 
     anchors: IntArray
@@ -61,6 +63,17 @@ class FlatMap(NamedTuple):
     jacobians: FloatArray
     inverse_jacobians: FloatArray
     facts: dict[str, Any]
+    charted: Charted
+
+    def turned(self) -> FlatMap:
+        """The same map seen from the other side of the surface: mirrored."""
+        mirror = np.array([-1.0, 1.0])
+        return self._replace(
+            uv=self.uv * mirror,
+            jacobians=self.jacobians * mirror[:, None],
+            inverse_jacobians=self.inverse_jacobians * mirror,
+            charted=self.charted.turned(),
+        )
 
 
 class Flattened(NamedTuple):
@@ -134,7 +147,8 @@ def flat_map(points: FloatArray, deadline: float = math.inf) -> FlatMap:
         "denoised": flat.is_denoised,
     }
     inverse: FloatArray = np.asarray(np.linalg.pinv(jacobians, rcond=0.1), dtype=np.float64)
-    return FlatMap(flat.rows, flat.uv[chosen], jacobians, inverse, facts)
+    charted = Charted(flat.mesh, Parameterization(flat.uv, flat.disk.faces))
+    return FlatMap(flat.rows, flat.uv[chosen], jacobians, inverse, facts, charted)
 
 
 def _still(points: FloatArray) -> tuple[Mesh, bool]:

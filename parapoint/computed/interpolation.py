@@ -9,7 +9,8 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from scipy.spatial import cKDTree
 
-from parapoint.surfaces.surface import FloatArray, IntArray
+from parapoint.surfaces.parameterization import Charted, Parameterization
+from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 
 NEIGHBOURS = 16
 """Anchors that may have a say near each anchor, itself included."""
@@ -116,16 +117,24 @@ class InterpolatedMap:
     Attributes:
         forward: R³ → R².
         inverse: R² → R³, over the images of the same anchors.
+        triangulation: the mesh that the map was computed on, if it was, with its map.
     """
 
     forward: Interpolant
     inverse: Interpolant
+    triangulation: Charted | None = None
 
     @classmethod
-    def of(cls, forward: Anchors, inverse_jacobians: FloatArray) -> Self:
+    def of(
+        cls, forward: Anchors, inverse_jacobians: FloatArray, triangulation: Charted | None = None
+    ) -> Self:
         """The map with these anchors (A, 3) → (A, 2) and d x / d uv (A, 3, 2)."""
         backward = Anchors(forward.values, forward.points, inverse_jacobians)
-        return cls(Interpolant.of(forward), Interpolant.of(backward))
+        return cls(Interpolant.of(forward), Interpolant.of(backward), triangulation)
+
+    def charted(self) -> Charted | None:
+        """See `SurfaceMap`."""
+        return self.triangulation
 
     def flatten(self, points: FloatArray) -> FloatArray:
         """See `SurfaceMap`."""
@@ -138,12 +147,17 @@ class InterpolatedMap:
     def arrays(self) -> dict[str, np.ndarray]:
         """See `SurfaceMap`."""
         anchors = self.forward.anchors
-        return {
+        arrays: dict[str, np.ndarray] = {
             "points": anchors.points,
             "uv": anchors.values,
             "jacobians": anchors.jacobians,
             "inverse_jacobians": self.inverse.anchors.jacobians,
         }
+        if self.triangulation is not None:
+            mesh, held = self.triangulation
+            arrays |= {"vertices": mesh.vertices, "faces": mesh.faces}
+            arrays |= {"corner_uv": held.uv, "corners": held.corners}
+        return arrays
 
     def facts(self) -> dict[str, Any]:
         """See `SurfaceMap`."""
@@ -153,4 +167,8 @@ class InterpolatedMap:
     def restored(cls, arrays: dict[str, np.ndarray]) -> Self:
         """The map that `arrays` returned."""
         forward = Anchors(arrays["points"], arrays["uv"], arrays["jacobians"])
-        return cls.of(forward, arrays["inverse_jacobians"])
+        triangulation = None
+        if "vertices" in arrays:
+            mesh = Mesh(arrays["vertices"], arrays["faces"])
+            triangulation = Charted(mesh, Parameterization(arrays["corner_uv"], arrays["corners"]))
+        return cls.of(forward, arrays["inverse_jacobians"], triangulation)

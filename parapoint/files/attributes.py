@@ -57,3 +57,9 @@ def colours_of(values: npt.NDArray[Any]) -> npt.NDArray[Any] | None:
     if values.dtype == np.uint8:
         return values
     return values.astype(np.uint8 if most <= 255 else np.uint16)
+
+
+def unit_colours(colours: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
+    """Colours (see `PointCloud`) as fractions."""
+    most = 1.0 if colours.dtype.kind == "f" else float(np.iinfo(colours.dtype).max)
+    return np.asarray(colours / np.float32(most), dtype=np.float32)

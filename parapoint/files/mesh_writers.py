@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import struct
-import zlib
 from pathlib import Path
+from typing import NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from parapoint.errors import InputError
+from parapoint.files.png import png
 from parapoint.files.targets import beside, complete_file, sealed_png, sealed_text
-from parapoint.surfaces.parameterization import Parameterization
-from parapoint.surfaces.surface import Mesh
+from parapoint.surfaces.parameterization import Charted, Parameterization
+from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, vertex_normals
 
 
 def write_obj(
@@ -42,10 +42,7 @@ def write_obj(
         )
     material = ""
     if texture is not None:
-        image, library = beside(path, ".png"), beside(path, ".mtl")
-        pixels = sealed_png(png(texture))
-        with complete_file(image) as file:
-            file.write(pixels)
+        image, library = _texture_beside(path, texture), beside(path, ".mtl")
         with complete_file(library) as file:
             file.write(sealed_text(f"newmtl map\nKd 1 1 1\nmap_Kd {image.name}\n"))
         material = f"mtllib {library.name}\nusemtl map\n"
@@ -60,30 +57,123 @@ def write_obj(
         file.write("".join(lines).encode())
 
 
-def png(pixels: npt.NDArray[np.uint8]) -> bytes:
-    """A PNG file of (H, W, 3) uint8 pixels.
+def write_textured(path: str | Path, charted: Charted, texture: npt.NDArray[np.uint8]) -> None:
+    """Write a textured mesh as .obj, .glb or .ply.
 
     Raises:
-        InputError: another shape or type.
+        InputError: another ending.
+        OSError: a file cannot be written; nothing of the mesh is left behind.
     """
-    if pixels.ndim != 3 or pixels.shape[2] != 3 or pixels.dtype != np.uint8 or pixels.size == 0:
-        raise InputError(
-            f"a texture must be (H, W, 3) uint8 pixels, not {pixels.shape} {pixels.dtype}"
-        )
-    height, width, _ = pixels.shape
-    rows = np.zeros((height, 1 + 3 * width), dtype=np.uint8)  # each row begins with filter 0
-    rows[:, 1:] = pixels.reshape(height, -1)
+    ending = Path(path).suffix.lower()
+    if ending == ".obj":
+        write_obj(path, *charted, texture)
+    elif ending == ".glb":
+        write_glb(path, charted, texture)
+    elif ending == ".ply":
+        write_ply(path, charted, texture)
+    else:
+        raise InputError(f"{path}: a textured mesh is written as .obj, .glb or .ply")
 
-    def chunk(kind: bytes, body: bytes) -> bytes:
-        crc = zlib.crc32(kind + body)
-        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", crc)
 
-    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)  # 8 bits of red, green, blue
-    return b"".join(
-        [
-            b"\x89PNG\r\n\x1a\n",
-            chunk(b"IHDR", header),
-            chunk(b"IDAT", zlib.compress(rows.tobytes())),
-            chunk(b"IEND", b""),
-        ]
+def _texture_beside(path: Path, texture: npt.NDArray[np.uint8]) -> Path:
+    """Write the texture beside `path`; the file."""
+    image = beside(path, ".png")
+    pixels = sealed_png(png(texture))
+    with complete_file(image) as file:
+        file.write(pixels)
+    return image
+
+
+class _Split(NamedTuple):
+    """A mesh whose vertices are repeated along the seams of its map, one uv each.
+
+    Attributes:
+        points: (V, 3).
+        normals: (V, 3) unit normals of the whole surface, so that seams do not show.
+        uv: (V, 2).
+        faces: (F, 3).
+    """
+
+    points: FloatArray
+    normals: FloatArray
+    uv: FloatArray
+    faces: IntArray
+
+    @classmethod
+    def of(cls, charted: Charted) -> Self:
+        mesh, held = charted
+        pairs = np.stack([mesh.faces, held.corners], axis=2).reshape(-1, 2)
+        pairs, row = np.unique(pairs, axis=0, return_inverse=True)
+        normals = vertex_normals(mesh)[pairs[:, 0]]
+        points = mesh.vertices[pairs[:, 0]]
+        return cls(points, normals, held.uv[pairs[:, 1]], row.reshape(-1, 3))
+
+
+def write_glb(path: str | Path, charted: Charted, texture: npt.NDArray[np.uint8]) -> None:
+    """Write a textured mesh as binary glTF 2, the texture inside.
+
+    Positions are of single precision there, so they are written around the middle of the mesh,
+    and the node carries it to its place.
+
+    Raises:
+        OSError: the file cannot be written; nothing is left behind.
+    """
+    import trimesh
+    from PIL import Image
+    from trimesh.visual.material import PBRMaterial
+
+    split = _Split.of(charted)
+    middle = (split.points.min(axis=0) + split.points.max(axis=0)) / 2
+    picture = Image.fromarray(texture)
+    material = PBRMaterial(baseColorTexture=picture, metallicFactor=0.0, roughnessFactor=1.0)  # type: ignore[no-untyped-call]  # trimesh's
+    mesh = trimesh.Trimesh(
+        split.points - middle,
+        split.faces,
+        vertex_normals=split.normals,
+        visual=trimesh.visual.TextureVisuals(split.uv, material=material),  # type: ignore[no-untyped-call]  # trimesh's
+        process=False,
     )
+    place = np.eye(4)
+    place[:3, 3] = middle
+    scene = trimesh.Scene()
+    scene.add_geometry(mesh, transform=place)
+    data = scene.export(file_type="glb", include_normals=True)  # type: ignore[no-untyped-call]  # trimesh's
+    with complete_file(Path(path)) as file:
+        file.write(data)
+
+
+def write_ply(path: str | Path, charted: Charted, texture: npt.NDArray[np.uint8]) -> None:
+    """Write a textured mesh as PLY: s and t at the vertices, and the texture beside it (.png).
+
+    Blender reads s and t; MeshLab reads the list "texcoord" of each face and the comment that
+    names the texture.
+
+    Raises:
+        OSError: a file cannot be written; nothing of the PLY is left behind.
+    """
+    path = Path(path)
+    image = _texture_beside(path, texture)
+    split = _Split.of(charted)
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        f"comment TextureFile {image.name}",
+        f"element vertex {len(split.points)}",
+        *(f"property double {axis}" for axis in "xyz"),
+        *(f"property float {name}" for name in ("nx", "ny", "nz", "s", "t")),
+        f"element face {len(split.faces)}",
+        "property list uchar int vertex_indices",
+        "property list uchar float texcoord",
+        "end_header\n",
+    ]
+    vertices = np.zeros(
+        len(split.points), [("at", "<f8", 3), ("normal", "<f4", 3), ("uv", "<f4", 2)]
+    )
+    vertices["at"], vertices["normal"], vertices["uv"] = split.points, split.normals, split.uv
+    lists = [("n", "u1"), ("row", "<i4", 3), ("m", "u1"), ("uv", "<f4", (3, 2))]
+    faces = np.zeros(len(split.faces), lists)
+    faces["n"], faces["row"], faces["m"], faces["uv"] = 3, split.faces, 6, split.uv[split.faces]
+    with complete_file(path) as file:
+        file.write("\n".join(header).encode())
+        file.write(vertices.tobytes())
+        file.write(faces.tobytes())

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from parapoint.errors import InputError
-from parapoint.files.attributes import COLOUR_COLUMNS
+from parapoint.files.attributes import COLOUR_COLUMNS, unit_colours
 from parapoint.files.targets import complete_file
 from parapoint.surfaces.surface import FloatArray, PointCloud, read_only
 
@@ -112,12 +112,6 @@ def _obj(file: IO[bytes], cloud: PointCloud, uv: FloatArray) -> None:
         for rows in _slices(len(values)):
             lines = (" ".join(map(repr, row)) for row in values[rows].tolist())
             file.write("".join(f"{key} {line}\n" for line in lines).encode())
-
-
-def unit_colours(colours: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
-    """Colours (see `PointCloud`) as fractions."""
-    most = 1.0 if colours.dtype.kind == "f" else float(np.iinfo(colours.dtype).max)
-    return np.asarray(colours / np.float32(most), dtype=np.float32)
 
 
 def _slices(count: int) -> Iterator[slice]:

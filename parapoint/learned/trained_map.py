@@ -60,6 +60,9 @@ class TrainedMap:
         """See `SurfaceMap`."""
         return {name: of.cpu().numpy() for name, of in self.networks.state_dict().items()}
 
+    def charted(self) -> None:
+        """See `SurfaceMap`."""
+
     def facts(self) -> dict[str, Any]:
         """See `SurfaceMap`."""
         return {"preset": self.preset.facts()}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,7 +13,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from parapoint.errors import InputError
-from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, edge_table, read_only
+from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh, edge_table, read_only
 
 
 class TracePoint(NamedTuple):
@@ -36,7 +37,7 @@ class Parameterization:
     """A map of a mesh to the plane, one uv for each face corner, indexed as in an OBJ file.
 
     Attributes:
-        uv: (T, 2) float64 coordinates, finite.
+        uv: (T, 2) float64 coordinates, finite; a row of two NaN is a place that the map leaves out.
         corners: (F, 3) int64: corner k of face f lies at `uv[corners[f, k]]`. Faces are in the
             order of the mesh. A seam is where the two faces at an edge use different rows.
         trace: states on the way there, if the method keeps them.
@@ -52,12 +53,18 @@ class Parameterization:
     report: Mapping[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        uv = read_only(self.uv, np.float64, "uv", 2)
+        uv = _uv_rows(self.uv)
         corners = read_only(self.corners, np.int64, "corners", 3)
         if len(corners) and (corners.min() < 0 or corners.max() >= len(uv)):
             raise InputError(f"corners must be rows of uv, which run from 0 to {len(uv) - 1}")
         object.__setattr__(self, "uv", uv)
         object.__setattr__(self, "corners", corners)
+
+    @property
+    def covered(self) -> BoolArray:
+        """(F,) whether the map has a place for all corners of each face."""
+        known: BoolArray = np.asarray(np.isfinite(self.uv).all(axis=1))
+        return np.asarray(known[self.corners].all(axis=1))
 
     @cached_property
     def _edge_table(self) -> tuple[IntArray, IntArray, IntArray]:
@@ -101,7 +108,9 @@ class Parameterization:
     def seams(self, mesh: Mesh) -> IntArray:
         """(S, 2) interior edges of `mesh` along which the map is cut, smaller vertex first.
 
-        An edge with two faces is a seam unless both use the same two rows of `uv` there.
+        An edge with two faces is a seam unless both use the same two rows of `uv` there. In
+        general it is one where a face at it lies at the border of its chart: at the pole of a
+        globe, whose triangles without area join the charts' faces in the plane, nothing is cut.
 
         Raises:
             InputError: the mesh has another number of faces.
@@ -110,14 +119,29 @@ class Parameterization:
             raise InputError(
                 f"{len(self.corners)} corner rows for a mesh of {len(mesh.faces)} faces"
             )
-        start = self.corners.reshape(-1)
-        end = np.roll(self.corners, -1, axis=1).reshape(-1)
-        forward = mesh.halfedges[:, 0] <= mesh.halfedges[:, 1]
-        ends = np.where(forward[:, None], np.stack([start, end], 1), np.stack([end, start], 1))
-        order = np.argsort(mesh.edge_of_halfedge, kind="stable")
-        first = order[np.cumsum(mesh.edge_face_count) - mesh.edge_face_count]
-        differs = (ends != ends[first[mesh.edge_of_halfedge]]).any(axis=1)
-        return np.asarray(mesh.edges[np.unique(mesh.edge_of_halfedge[differs])], dtype=np.int64)
+        is_border = self.edge_face_count[self.edge_of_halfedge] == 1
+        is_inner = mesh.edge_face_count[mesh.edge_of_halfedge] > 1
+        is_inner &= mesh.halfedges[:, 0] != mesh.halfedges[:, 1]
+        cut = np.unique(mesh.edge_of_halfedge[is_border & is_inner])
+        return np.asarray(mesh.edges[cut], dtype=np.int64)
+
+
+class Charted(NamedTuple):
+    """A mesh with a map of it.
+
+    Attributes:
+        mesh: the mesh.
+        map: its map, with a row of corners for each of its faces.
+    """
+
+    mesh: Mesh
+    map: Parameterization
+
+    def turned(self) -> Charted:
+        """The other side up: faces turned round, and the plane mirrored, so that none flips."""
+        uv = self.map.uv * [-1.0, 1.0]
+        faces, corners = self.mesh.faces[:, ::-1], self.map.corners[:, ::-1]
+        return Charted(Mesh(self.mesh.vertices, faces), Parameterization(uv, corners))
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +149,8 @@ class PointParameterization:
     """A map of a point cloud to the plane.
 
     Attributes:
-        uv: (P, 2) float64 coordinates, finite, one row a point.
+        uv: (P, 2) float64 coordinates, one row a point, finite; a row of two NaN is a point that
+            the map leaves out, such as a stray one.
         trace: states on the way there, if the method keeps them.
         report: what the method wants written beside its result.
 
@@ -138,4 +163,28 @@ class PointParameterization:
     report: Mapping[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "uv", read_only(self.uv, np.float64, "uv", 2))
+        object.__setattr__(self, "uv", _uv_rows(self.uv))
+
+    @property
+    def covered(self) -> BoolArray:
+        """(P,) whether the map has a place for each point."""
+        return np.asarray(np.isfinite(self.uv).all(axis=1))
+
+
+def _uv_rows(values: object) -> FloatArray:
+    """A read-only copy of (T, 2) coordinates, whose rows are finite or of two NaN.
+
+    Raises:
+        InputError: the shape is another, or a row is neither.
+    """
+    left_out: BoolArray = np.zeros(0, dtype=bool)
+    with contextlib.suppress(TypeError, ValueError, OverflowError):
+        array = np.array(values, dtype=np.float64)
+        if array.ndim == 2:
+            left_out = np.asarray(np.isnan(array).all(axis=1))
+            values = np.where(left_out[:, None], 0.0, array)
+    uv: FloatArray = read_only(values, np.float64, "uv", 2)
+    if left_out.any():
+        uv = np.where(left_out[:, None], np.nan, uv)
+        uv.setflags(write=False)
+    return uv

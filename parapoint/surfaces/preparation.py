@@ -308,8 +308,10 @@ def _packed(
         (x, y), (z, w) = (b - a).T, (c - a).T
         uv_area = float(np.abs(x * w - y * z).sum()) / 2
         scaled = uv * np.sqrt(size / uv_area if uv_area > 0 else 1.0)
-        placed.append(scaled - scaled[chart.corners].min(axis=(0, 1)))
-    sizes = [uv[chart.corners].max(axis=(0, 1)) for uv, chart in zip(placed, charts, strict=True)]
+        placed.append(scaled - np.nanmin(scaled[chart.corners], axis=(0, 1)))
+    sizes = [
+        np.nanmax(uv[chart.corners], axis=(0, 1)) for uv, chart in zip(placed, charts, strict=True)
+    ]
     corner = shelves(np.array(sizes))
     return np.concatenate([uv + at for uv, at in zip(placed, corner, strict=True)])
 

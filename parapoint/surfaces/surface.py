@@ -239,6 +239,15 @@ class Mesh:
         return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2, dtype=np.float64)
 
 
+def vertex_normals(mesh: Mesh) -> FloatArray:
+    """(V, 3) unit normals of the vertices, the means of the faces around by area; or 0."""
+    normals = np.zeros(mesh.vertices.shape)
+    by_face = mesh.face_areas[:, None] * unit_normals(mesh.vertices, mesh.faces)
+    for corner in mesh.faces.T:
+        np.add.at(normals, corner, by_face)
+    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300))
+
+
 @dataclass(frozen=True, eq=False)
 class PointCloud:
     """Points on a surface.

@@ -39,6 +39,9 @@ def test_the_trainer_has_its_loss_and_its_gradients() -> None:
     preset = dataclasses.replace(PAPER, warm_up=0.0, perturbation=0.0, iterations=1, all_from=0.0)
     trainer = Trainer(points, preset, seed=0, device="cpu")
     trainer.networks.double()
+    with torch.no_grad():  # as they are drawn, tangents are a thousandth and hide two terms
+        for parameter in trainer.networks.parameters():
+            parameter.mul_(2.5)
     rows, grid = (batch.double() for batch in trainer._batch())
     terms = trainer.terms(rows, grid, rows[0])
     total = torch.stack([trainer.weights[name] * value for name, value in terms.items()]).sum()

@@ -10,6 +10,7 @@ from PIL import Image
 
 from benchmarks.__main__ import main
 from benchmarks.commands.score import json_values, map_state, number, same_faces, worst_faces
+from benchmarks.metrics.grades import GRADES
 from benchmarks.metrics.table import METRICS, MapState, evaluate
 from parapoint import Mesh, console
 from parapoint.files.reading import read_parameterized
@@ -73,6 +74,7 @@ def test_json_is_one_object_with_the_names_of_the_registry(obj, capsys):
     code, out, err = run(capsys, obj, "--json", "--reference", obj)
     assert (code, err) == (0, "")
     values = json.loads(out)
+    assert values.pop("grade") in GRADES
     assert list(values) == [m.name for m in METRICS.values() if m.group != "points"]
     assert values == evaluate(*read_parameterized(obj), read_parameterized(obj)[1])
     assert values["chart_count"] == 2
@@ -109,7 +111,9 @@ def test_a_point_cloud_is_scored_without_a_mesh(tmp_path, capsys):
     code, out, _ = run(capsys, path, "--json")
     assert code == 0
     values = json.loads(out)
-    assert list(values) == [m.name for m in METRICS.values() if m.group == "points"]
+    assert values.pop("grade") == "usable"
+    names = [m.name for m in METRICS.values() if m.group == "points"]
+    assert list(values) == [*names, "coverage"]
     assert values["local_quasi_conformal_mean"] == pytest.approx(3, rel=1e-9)
     code, out, _ = run(capsys, path)
     assert "neighbour_preservation" in out

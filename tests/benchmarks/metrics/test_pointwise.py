@@ -29,7 +29,7 @@ def test_a_similarity_is_perfect(scale):
     turn = np.linalg.qr(np.random.default_rng(1).normal(size=(2, 2)))[0]
     values = scores(points, scale * points @ turn + scale)
     expected = {m.name for m in METRICS.values() if m.group == "points"}
-    assert set(values) == expected
+    assert set(values) == expected | {"coverage"}
     for name in expected:
         ideal = METRICS[name].ideal
         if ideal is not None:
@@ -163,4 +163,4 @@ def test_few_points_and_other_lengths_are_refused():
         point_map(PointCloud(np.eye(3)), PointParameterization(np.zeros((3, 2))))
     with pytest.raises(InputError, match="5 uv rows for a cloud of 6 points"):
         point_map(PointCloud(np.zeros((6, 3))), PointParameterization(np.zeros((5, 2))))
-    assert len(scores(plane(4), plane(4))) == 10
+    assert len(scores(plane(4), plane(4))) == 13

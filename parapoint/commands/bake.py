@@ -1,0 +1,97 @@
+"""`parapoint bake`: what the points of a cloud know, painted into a texture of its surface."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from parapoint.commands.output import TEXTURE
+from parapoint.errors import InputError
+from parapoint.files.png import png
+from parapoint.files.reading import faults_of, read_parameterized, read_surface
+from parapoint.files.targets import checked_target, complete_file, sealed_png
+from parapoint.surfaces.parameterization import Charted
+from parapoint.surfaces.surface import Mesh, PointCloud
+from parapoint.textures.baking import (
+    MAPS,
+    MARGIN,
+    baked,
+    check_bakeable,
+    check_in_square,
+    check_size,
+    check_together,
+)
+from parapoint.textures.placing import Placing
+
+
+@click.command()
+@click.argument("model", metavar="MODEL")
+@click.argument("cloud", metavar="CLOUD")
+@click.option("--out", required=True, metavar="FILE", help="FILE.png.")
+@click.option("--map", "kind", required=True, help=f"{', '.join(MAPS)}.")
+@click.option("--texture", type=int, default=TEXTURE, show_default=True, help="Texels a side.")
+@click.option("--margin", type=int, default=MARGIN, show_default=True, help="In texels.")
+@click.option("--force", is_flag=True, help="Replace files of yours that are in the way.")
+@click.option("--json", "as_json", is_flag=True, help="Print the report as one JSON object.")
+def bake(
+    model: str,
+    cloud: str,
+    out: str,
+    *,
+    kind: str,
+    texture: int,
+    margin: int,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Paint what the points of CLOUD know into a texture of MODEL.
+
+    MODEL is a folder of `fit`, or a mesh with UVs, of the same surface. CLOUD may have any number
+    of points. Of a folder the texture fits the UVs that `map` writes. A normal map is in tangent
+    space, as glTF has it; a position map is a geometry image of 16 bits.
+    """
+    if Path(out).suffix.lower() != ".png":
+        raise InputError(f"{out}: a texture is written as .png")
+    if kind not in MAPS:
+        raise InputError(f"--map must be one of {', '.join(MAPS)}, not {kind!r}")
+    check_size(texture, margin)
+    path = checked_target(out, inputs=[model, cloud], force=force)
+    points = _points(cloud, kind)
+    charted = _charted(model)
+    with faults_of(Path(cloud)):
+        check_together(charted, points)
+    made = baked(charted, points, kind, texture, margin)
+    data = sealed_png(png(made.pixels, made.text))
+    with complete_file(path) as file:
+        file.write(data)
+    facts = {"file": out, "map": kind, "points": len(points.points), "texture": texture}
+    facts |= {"texture_fill": round(made.fill, 3), **made.text}
+    if as_json:
+        print(json.dumps(facts))
+    else:
+        print(f"{out}: {kind} of {len(points.points)} points in {texture} x {texture} texels")
+
+
+def _points(path: str, kind: str) -> PointCloud:
+    """The cloud, once it is known to have what the map shows."""
+    surface = read_surface(path)
+    with faults_of(Path(path)):
+        if isinstance(surface, Mesh):
+            raise InputError("is a mesh; a cloud of points is baked")
+        check_bakeable(surface, kind)
+    return surface
+
+
+def _charted(model: str) -> Charted:
+    """The mesh of a fitted model in the unit square, or the mesh and map of a file."""
+    if Path(model).is_dir():
+        from parapoint.estimator import load
+
+        fitted = load(model).mesh()
+        return Placing.smallest(fitted.map.uv).of(fitted)
+    charted = Charted(*read_parameterized(model))
+    with faults_of(Path(model)):
+        check_in_square(charted)
+    return charted

@@ -1,0 +1,33 @@
+import numpy as np
+from numpy.testing import assert_allclose
+
+from parapoint.surfaces.gridding import CELLS, gridded
+
+RNG = np.random.default_rng(0)
+
+
+def cylinder(uv: np.ndarray) -> np.ndarray:
+    return np.column_stack([np.cos(uv[:, 0]), np.sin(uv[:, 0]), uv[:, 1]])
+
+
+def test_the_grid_covers_the_images_and_lies_on_the_surface() -> None:
+    known = RNG.random((3000, 2)) * [3, 2]
+    mesh, own = gridded(known, cylinder)
+    assert_allclose(mesh.vertices, cylinder(own.uv))
+    assert mesh.topology == "disk"
+    assert_allclose(mesh.face_areas.sum(), 6, rtol=0.1)
+    assert len(mesh.faces) < 2 * (CELLS + 1) ** 2
+
+
+def test_what_no_image_is_near_is_left_out() -> None:
+    known = RNG.random((8000, 2)) * [3, 2]
+    hole = np.linalg.norm(known - [1.5, 1], axis=1) > 0.5
+    mesh, own = gridded(known[hole], cylinder)
+    assert len(mesh.boundary_loops) == 2
+    assert (np.linalg.norm(own.uv - [1.5, 1], axis=1) > 0.25).all()
+
+
+def test_faces_over_a_tear_are_left_out() -> None:
+    known = RNG.random((3000, 2))
+    torn = gridded(known, lambda uv: np.column_stack([uv, 5.0 * (uv[:, 0] > 0.5)])).mesh
+    assert torn.component_count == 2

@@ -1,0 +1,181 @@
+"""`unwrap` of clouds into textured meshes, and `bake`."""
+
+import contextlib
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from parapoint import ComputedMap, PointCloud, cli
+from parapoint.commands.output import write
+from parapoint.files.point_writers import write_points
+from parapoint.files.reading import read_parameterized, read_surface
+
+COUNT = 400
+
+
+def run(arguments: list, capsys) -> tuple[int, str, str]:
+    """Exit status, standard output and standard error of a command."""
+    with pytest.raises(SystemExit) as end:
+        cli.console.run(cli.parapoint, list(map(str, arguments)))
+    shown = capsys.readouterr()
+    return int(end.value.code or 0), shown.out, shown.err
+
+
+@pytest.fixture(scope="module")
+def bowl() -> PointCloud:
+    """A coloured bowl, seen from below: its normals point down."""
+    rng = np.random.default_rng(0)
+    xy = np.sqrt(rng.random((COUNT, 1))) * [[1, 0]]
+    turn = 2 * np.pi * rng.random(COUNT)
+    xy = np.column_stack([xy[:, 0] * np.cos(turn), xy[:, 0] * np.sin(turn)])
+    points = np.column_stack([xy, 0.5 * (xy**2).sum(axis=1)])
+    normals = np.column_stack([xy, -np.ones(COUNT)])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    colours = np.rint(127.5 * (1 + np.column_stack([xy, 0 * turn]))).astype(np.uint8)
+    return PointCloud(points, normals, attributes={"colours": colours, "intensity": points[:, 0]})
+
+
+@pytest.fixture(scope="module")
+def model(bowl) -> ComputedMap:
+    return ComputedMap().fit(bowl)
+
+
+@pytest.fixture
+def scan(bowl, tmp_path):
+    path = tmp_path / "scan.ply"
+    write_points(path, bowl, bowl.points[:, :2])
+    return path
+
+
+def test_a_scan_becomes_a_textured_model_in_one_command(scan, tmp_path, capsys) -> None:
+    target = tmp_path / "scan.glb"
+    status, out, err = run(
+        ["unwrap", scan, "--out", target, "--texture", 128, "--margin", 4, "--json"], capsys
+    )
+    assert (status, err) == (0, "")
+    facts = json.loads(out)
+    assert facts["texture"] == 128
+    assert 0.4 < facts["texture_fill"] < 1
+    mesh, own = read_parameterized(target)
+    assert own.uv.min() > 3 / 128
+    assert own.uv.max() < 1 - 3 / 128
+    assert len(mesh.vertices) == COUNT
+    # Seen from below, as the normals point, nothing is mirrored.
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    assert np.cross(b - a, c - a)[:, 2].max() < 0
+    first, second = (own.uv[own.corners[:, k]] - own.uv[own.corners[:, 0]] for k in (1, 2))
+    assert (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]).min() > 0
+
+
+@pytest.mark.parametrize("ending", [".obj", ".ply"])
+def test_the_texture_shows_each_point_in_its_colour(ending, model, bowl, tmp_path) -> None:
+    target = tmp_path / f"a{ending}"
+    write(model, bowl, str(target), 256)
+    picture = np.asarray(Image.open(tmp_path / "a.png"))
+    assert picture.shape == (256, 256, 3)
+    if ending == ".ply":
+        mesh = read_surface(target)
+        assert len(mesh.vertices) == COUNT
+        return
+    mesh, own = read_parameterized(target)
+    uv = np.empty((len(mesh.vertices), 2))
+    uv[mesh.faces] = own.uv[own.corners]
+    column, line = (256 * uv[:, 0]).astype(int), (256 * (1 - uv[:, 1])).astype(int)
+    wanted = 127.5 * (1 + np.column_stack([mesh.vertices[:, :2], np.zeros(COUNT)]))
+    assert np.abs(picture[line, column] - wanted).mean() < 3
+
+
+def test_a_cloud_without_colours_gets_a_checkerboard(model, bowl, tmp_path) -> None:
+    facts = write(model, PointCloud(bowl.points), str(tmp_path / "a.ply"), 64)
+    assert "texture_fill" not in facts
+    values = np.unique(np.asarray(Image.open(tmp_path / "a.png")))
+    assert values.tolist() == [70, 235]
+
+
+def test_points_keep_what_is_known_of_them(model, bowl, tmp_path) -> None:
+    write(model, bowl, str(tmp_path / "a.ply"))
+    cloud = read_surface(tmp_path / "a.ply")
+    assert np.array_equal(cloud.attributes["colours"], bowl.attributes["colours"])
+    uv = np.column_stack([cloud.attributes["u"], cloud.attributes["v"]])
+    assert uv.min() >= 0
+    assert uv.max() <= 1
+
+
+@pytest.mark.parametrize("kind", ["colour", "normal", "position", "intensity"])
+def test_bake_of_a_saved_model(kind, model, scan, tmp_path, capsys) -> None:
+    model.save(tmp_path / "model")
+    target = tmp_path / f"{kind}.png"
+    status, out, err = run(
+        ["bake", tmp_path / "model", scan, "--out", target, "--map", kind, "--texture", 64], capsys
+    )
+    assert (status, err) == (0, "")
+    assert out == f"{target}: {kind} of {COUNT} points in 64 x 64 texels\n"
+    with Image.open(target) as image:
+        assert image.size == (64, 64)
+        if kind == "position":
+            assert len(image.info["position of black"].split()) == 3
+        if kind == "normal":  # the mesh has the normals of the cloud, up to the triangles' size
+            blue = np.asarray(image)[..., 2]
+            assert blue[24:40, 24:40].min() > 240
+
+
+def test_bake_of_a_mesh_is_of_its_own_uv(model, bowl, scan, tmp_path, capsys) -> None:
+    write(model, bowl, str(tmp_path / "mesh.obj"), 64)
+    first = ["bake", tmp_path / "mesh.obj", scan, "--map", "colour", "--texture", 64]
+    assert run([*first, "--out", tmp_path / "b.png", "--json"], capsys)[0] == 0
+    # 64 texels leave a quarter of a texel free around the map, as unwrap does.
+    again = np.asarray(Image.open(tmp_path / "b.png")).astype(int)
+    written = np.asarray(Image.open(tmp_path / "mesh.png")).astype(int)
+    assert np.abs(again - written).mean() < 0.1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["unwrap", "SCAN", "--out", "a.glb", "--texture", "0"], "--texture must be from 16 to"),
+        (["unwrap", "SCAN", "--out", "a.glb", "--texture", "100000"], "--texture must be from"),
+        (["unwrap", "SCAN", "--out", "a.glb", "--margin", "-1"], "--margin must be from 0"),
+        (["unwrap", "SCAN", "--out", "a.fbx"], "cannot write this ending"),
+        (["unwrap", "SCAN", "--out", "no/a.glb"], "there is no such folder"),
+        (["unwrap", "SCAN", "--out", "SCAN"], "is the input"),
+        (["unwrap", "SCAN", "--out", "mine.obj"], "is a file of yours"),
+        (
+            ["unwrap", "SCAN", "--out", "mine.ply", "--texture", "64"],
+            "is a file of yours",
+        ),
+        (["bake", "MESH", "SCAN", "--out", "a.jpg", "--map", "colour"], "written as .png"),
+        (["bake", "MESH", "SCAN", "--out", "a.png", "--map", "gloss"], "--map must be one of"),
+        (
+            ["bake", "MESH", "SCAN", "--out", "a.png", "--map", "colour", "--texture", "0"],
+            "from 16",
+        ),
+        (["bake", "MESH", "SCAN", "--out", "no/a.png", "--map", "colour"], "no such folder"),
+        (["bake", "MESH", "BARE", "--out", "a.png", "--map", "colour"], "bare.xyz: has no colours"),
+        (["bake", "MESH", "BARE", "--out", "a.png", "--map", "normal"], "has no normals"),
+        (["bake", "MESH", "MESH", "--out", "a.png", "--map", "position"], "is a mesh; a cloud"),
+        (["bake", "SCAN", "SCAN", "--out", "a.png", "--map", "colour"], "carries no UV map"),
+        (["bake", "MESH", "FAR", "--out", "a.png", "--map", "position"], "does not lie on"),
+        (["bake", "EMPTY", "SCAN", "--out", "a.png", "--map", "colour"], "no saved model here"),
+    ],
+)
+@pytest.mark.usefixtures("scan")
+def test_wrong_use_is_one_line_and_nothing_written(arguments, message, tmp_path, capsys) -> None:
+    points = read_surface(tmp_path / "scan.ply").points
+    np.savetxt(tmp_path / "bare.xyz", points)
+    np.savetxt(tmp_path / "far.xyz", points + 10)
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "mine.png").write_bytes(b"a picture of my own")
+    (tmp_path / "mesh.obj").write_text(
+        "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
+    )
+    names = {"SCAN": "scan.ply", "BARE": "bare.xyz", "FAR": "far.xyz"}
+    names |= {"MESH": "mesh.obj", "EMPTY": "empty"}
+    before = {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
+    with contextlib.chdir(tmp_path):
+        status, out, err = run([names.get(word, word) for word in arguments], capsys)
+    assert (status, out) == (2, "")
+    assert message in err
+    assert err.count("\n") == 1
+    assert {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
