@@ -16,7 +16,7 @@ from baselines.tools.meshlab import pymeshlab
 from baselines.tools.xatlas_charts import Xatlas
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
-from parapoint.surfaces.parameterization import Parameterization, PointParameterization
+from parapoint.surfaces.parameterization import Charted, Parameterization, PointParameterization
 from parapoint.surfaces.preparation import prepared
 from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, PointCloud, Surface
 
@@ -77,6 +77,25 @@ class Meshed:
         """
         if not isinstance(surface, PointCloud):
             raise UnsupportedError("takes a point cloud; the surface is a mesh")
+        (mesh, flat), report = self._charted(surface, seed)
+        uv, distance = carried(surface.points, mesh, flat)
+        facts = {
+            "charts": int(flat.charts().max()) + 1,
+            "seam_edges": len(flat.seams(mesh)),
+            "mean_distance_to_mesh": float(distance.mean()),
+            "largest_distance_to_mesh": float(distance.max()),
+        }
+        return PointParameterization(uv, report=report | facts)
+
+    def charted(self, surface: PointCloud, *, seed: int) -> Charted:
+        """The mesh of a cloud and its map, as `parameterize` makes them.
+
+        Raises:
+            UnsupportedError, FlatteningError: see `parameterize`.
+        """
+        return self._charted(surface, seed)[0]
+
+    def _charted(self, surface: PointCloud, seed: int) -> tuple[Charted, dict[str, object]]:
         mesh, report = reconstructed(surface, self.reconstruction)
         method = FLATTENINGS[self.flattening]
 
@@ -86,14 +105,7 @@ class Meshed:
         except (InputError, UnsupportedError) as error:  # of the mesh made here, not of the cloud
             raise FlatteningError(f"the reconstruction cannot be flattened: {error}") from None
         assert isinstance(flat, Parameterization)
-        uv, distance = carried(surface.points, mesh, flat)
-        facts = {
-            "charts": int(flat.charts().max()) + 1,
-            "seam_edges": len(flat.seams(mesh)),
-            "mean_distance_to_mesh": float(distance.mean()),
-            "largest_distance_to_mesh": float(distance.max()),
-        }
-        return PointParameterization(uv, report=report | facts)
+        return Charted(mesh, flat), report
 
 
 def reconstructed(cloud: PointCloud, kind: str) -> tuple[Mesh, dict[str, object]]:

@@ -203,6 +203,14 @@ class Estimator(ABC):
             return held
         return gridded(fitted.flatten(fitted.points), fitted.lift)
 
+    def charted(self, surface: Surface, *, seed: int) -> Charted:
+        """The mesh and map of a copy of this estimator that is fitted to a surface.
+
+        Raises:
+            InputError, RuntimeError: see `fit`.
+        """
+        return dataclasses.replace(self, seed=seed).fit(surface).mesh()  # type: ignore[type-var]  # a subclass is a dataclass
+
     def seams(
         self, points: npt.ArrayLike | Surface | None = None, *, rule: str = "stretch"
     ) -> BoolArray:

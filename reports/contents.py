@@ -20,9 +20,11 @@ from benchmarks.store.results import ResultRow, Store
 from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh, PointCloud
+from reports.ranking import grade_of, worst
 
 ANGLE, AREA = "angle_difference_mean", "area_discrepancy_total"
 FLIPPED, SPANNING = "flipped_fraction", "spanning_fraction"
+WORST_PART = "part_area_ratio_min_without_spanning"
 SHEETS = 12
 """Most models of a report in which each has figures of its own, and all pictures for them."""
 ISOMETRIC = "symmetric_dirichlet"
@@ -49,6 +51,7 @@ DISPLAY: dict[str, tuple[str, str]] = {
     "automatic+slim": ("Automatic cut + SLIM", ""),
     "parapoint+slim": ("Computed cut + SLIM", ""),
     "computed": ("Computed map", ""),
+    "parapoint(preset=learned)": ("ParaPoint, our training", ""),
     "parapoint": ("ParaPoint", ""),
 }
 """Name of a method in print and, where its parameters do not say it, what it minimises.
@@ -148,7 +151,8 @@ def labels(rows: Iterable[ResultRow]) -> dict[tuple[str, str], Label]:
     found: dict[tuple[str, str], Label] = {}
     for key in keys:
         method = key[0]
-        name, fixed = DISPLAY.get(method, (method, ""))
+        preset = params[key].get("preset")
+        name, fixed = DISPLAY.get(f"{method}(preset={preset})", DISPLAY.get(method, (method, "")))
         siblings = [params[other] for other in keys if other[0] == method and other != key]
         differing = [
             entry
@@ -187,7 +191,7 @@ class Contents:
         suite: its name.
         rows: the latest row of each cell.
         labels: the label of each row, by its id.
-        measured: one row a cell: case, label (short), seed, status, id, seconds, every metric.
+        measured: one row a cell: case, label (short), seed, status, id, grade, seconds, metrics.
         is_large: whether the folder holds more than SHEETS models, all suites together: then few
             have figures of their own, and pictures are small.
     """
@@ -275,8 +279,8 @@ class Contents:
     def means(self) -> pd.DataFrame:
         """One row a (case, label): means over the seeds that ended well, and counts.
 
-        Columns: case, label, ok, tried, skipped, status, reason, preprocessing, seconds, metrics.
-        A skipped cell was not tried.
+        Columns: case, label, ok, tried, skipped, status, reason, preprocessing, grade (the worst of
+        the seeds), seconds, metrics. A skipped cell was not tried.
         """
         records = []
         for case in self.cases:
@@ -296,6 +300,7 @@ class Contents:
                     "status": "ok" if ids else bad[0].status,
                     "reason": bad[0].reason if bad else "",
                     "preprocessing": rows[0].preprocessing,
+                    "grade": worst(values["grade"].tolist()) or "",
                 }
                 for name in ("seconds", *METRICS):
                     record[name] = values[name].mean() if len(values) else None
@@ -351,5 +356,11 @@ def contents(folder: Path) -> list[Contents]:
         )
         # A learned seam that faces span has no edges: 0 would read, and rank, as no seam at all.
         part.loc[part[SPANNING] > 0, ["seam_length", "seam_excess"]] = math.nan
+        cells: list[dict[str, Any]] = [
+            {str(name): value for name, value in record.items()}
+            for record in part.to_dict("records")
+        ]
+        grades = [grade_of(by_id[cell["id"]].method, cell) or "" for cell in cells]
+        part["grade"] = pd.Series(grades, part.index, dtype=object)
         found.append(Contents(store, suite, own, by_id, part, is_large))
     return found

@@ -10,7 +10,7 @@ from parapoint.errors import InputError
 from parapoint.estimator import Estimator
 from parapoint.files.mesh_writers import write_textured
 from parapoint.files.point_writers import write_points
-from parapoint.files.targets import checked_target
+from parapoint.files.targets import beside, checked_target
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.sampling import mean_spacing
 from parapoint.surfaces.spanning import Transform, opened, spanning_edges
@@ -18,6 +18,7 @@ from parapoint.surfaces.surface import Mesh, PointCloud, Surface
 from parapoint.textures.baking import MARGIN, baked
 from parapoint.textures.checkerboard import checkerboard
 from parapoint.textures.placing import BORDER, Placing
+from parapoint.textures.preview import write_preview
 
 ENDINGS = (".obj", ".glb", ".ply", ".npz")
 """Endings of files that a map can be written to."""
@@ -46,12 +47,29 @@ def target(out: str, surface: str, *, force: bool, textured: bool) -> str:
     return str(checked_target(out, sides=sides, inputs=[surface], force=force))
 
 
+def preview_target(preview: str, out: str, surface: str, *, force: bool) -> Path:
+    """The file for the picture beside `out`, checked before any work.
+
+    Raises:
+        InputError: it is no .png or the texture of `out`, or it cannot or may not be written.
+    """
+    if Path(preview).suffix.lower() != ".png":
+        raise InputError(f"{preview}: a preview is written as .png")
+    if Path(out).suffix in SIDES and Path(preview).absolute() == beside(
+        Path(out).absolute(), ".png"
+    ):
+        raise InputError(f"{preview}: is the texture of {out}; take another name")
+    return checked_target(preview, inputs=[surface], force=force)
+
+
 def write(
     model: Estimator,
     surface: Surface,
     out: str,
+    *,
     texture: int | None = None,
     margin: int | None = None,
+    preview: Path | None = None,
 ) -> dict[str, object]:
     """Map a surface into the unit square and write it; what was written, as facts.
 
@@ -62,6 +80,7 @@ def write(
         out: the file.
         texture: texels along a side of a texture, or None; .glb has one always.
         margin: texels around the map and its charts; 1 / 256 of the side if None.
+        preview: a PNG file for a picture of the surface beside its layout, or None.
     """
     ending = Path(out).suffix.lower()
     size = texture or TEXTURE
@@ -69,6 +88,7 @@ def write(
     placing = Placing.smallest(charted.map.uv, BORDER if margin is None else margin / size)
     points = surface.vertices if isinstance(surface, Mesh) else surface.points
     facts: dict[str, object] = {"file": out, "mapped_points": len(points)}
+    shown, pixels = placing.of(charted), checkerboard()
     if ending == ".npz" or (ending == ".ply" and texture is None):
         cloud = surface if isinstance(surface, PointCloud) else PointCloud(points)
         write_points(out, cloud, _then(model, placing)(points))
@@ -78,18 +98,20 @@ def write(
         spans = spanning_edges(surface, uv, transform, mean_spacing(model.points_))
         parameterization = opened(surface, uv, spans)
         facts["spanning_faces"] = int((parameterization.corners != surface.faces).any(1).sum())
-        write_textured(out, Charted(surface, parameterization), checkerboard())
+        shown = Charted(surface, parameterization)
+        write_textured(out, shown, pixels)
     elif ending == ".obj" and texture is None:
         write_points(out, surface, _then(model, placing)(points))
     else:
-        placed = placing.of(charted)
         facts |= {"faces": len(charted.mesh.faces), "texture": size}
         pixels = checkerboard(pixels=max(1, size // 32))
         if "colours" in surface.attributes:
-            made = baked(placed, surface, "colour", size, MARGIN if margin is None else margin)
+            made = baked(shown, surface, "colour", size, MARGIN if margin is None else margin)
             pixels = made.pixels.astype(np.uint8, copy=False)
             facts["texture_fill"] = round(made.fill, 3)
-        write_textured(out, placed, pixels)
+        write_textured(out, shown, pixels)
+    if preview is not None:
+        write_preview(preview, shown, pixels)
     return facts
 
 

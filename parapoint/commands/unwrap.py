@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from parapoint.commands.fitting import estimator_of, fitted, summary
-from parapoint.commands.output import TEXTURE, target, write
+from parapoint.commands.output import TEXTURE, preview_target, target, write
 from parapoint.files.reading import read_surface
 from parapoint.surfaces.components import components
 from parapoint.textures.baking import check_size
@@ -26,6 +26,7 @@ from parapoint.textures.baking import check_size
 )
 @click.option("--texture", type=int, metavar="N", help="Texels along a side of a texture.")
 @click.option("--margin", type=int, metavar="TEXELS", help="Free texels around the map.")
+@click.option("--preview", metavar="FILE", help="FILE.png: the surface beside its layout.")
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--force", is_flag=True, help="Replace files of yours that are in the way.")
 @click.option("--json", "as_json", is_flag=True, help="Print the report as one JSON object.")
@@ -35,6 +36,7 @@ def unwrap(
     *,
     texture: int | None,
     margin: int | None,
+    preview: str | None,
     force: bool,
     as_json: bool,
     **settings: Any,
@@ -50,9 +52,10 @@ def unwrap(
     """
     out = target(out, surface, force=force, textured=texture is not None)
     check_size(TEXTURE if texture is None else texture, margin or 0)
+    picture = None if preview is None else preview_target(preview, out, surface, force=force)
     given = read_surface(surface)
     model = fitted(surface, given, estimator_of("computed", settings))
     if model.components == "largest":
         given = components(given)[0]
-    facts = write(model, given, out, texture, margin)
+    facts = write(model, given, out, texture=texture, margin=margin, preview=picture)
     print(json.dumps({**facts, **model.report_}) if as_json else f"{out}: {summary(model)}")

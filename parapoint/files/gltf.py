@@ -25,10 +25,15 @@ from parapoint.files.content import (
     welded,
     whole,
 )
+from parapoint.files.decoding import check_decoded
 from parapoint.surfaces.surface import FloatArray, IntArray
 
 GLTF_TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 GLTF_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+UNDERSTOOD = {"KHR_mesh_quantization", "KHR_texture_transform", "EXT_mesh_gpu_instancing"}
+"""Extensions that are read where a file requires them."""
+APPEARANCE = ("KHR_materials_", "KHR_lights_", "KHR_texture_basisu", "EXT_texture_", "KHR_xmp")
+"""How names of extensions begin that change no vertex and no UV."""
 
 
 def glb(data: bytes, folder: Path) -> Content:
@@ -54,30 +59,47 @@ def gltf(data: bytes, folder: Path, chunk: bytes = b"") -> Content:
     positions are exactly equal: seams of the UV are seams, not boundaries of the mesh. The UV are
     those of the first set, with v upwards as in OBJ.
     """
-    return _Gltf(json.loads(data), folder, chunk).content()
+    return _Gltf(json.loads(data), folder, chunk, len(data) + len(chunk)).content()
 
 
 class _Gltf:
     """One glTF file while it is read."""
 
-    def __init__(self, tree: Any, folder: Path, chunk: bytes) -> None:
+    def __init__(self, tree: Any, folder: Path, chunk: bytes, size: int) -> None:
         if not isinstance(tree, dict) or not tree.get("meshes"):
             raise InputError("has no mesh")
-        self.tree = tree
-        self.buffers = [self._buffer(item, folder, chunk) for item in tree.get("buffers", [])]
+        unknown = [
+            name
+            for name in tree.get("extensionsRequired", [])
+            if name not in UNDERSTOOD and not name.startswith(APPEARANCE)
+        ]
+        if unknown:
+            raise InputError(f"needs {unknown[0]}, which is not read; export it without")
+        self.tree, self.folder, self.chunk, self.size = tree, folder, chunk, size
+        self.buffers: dict[str | int, bytes] = {}
 
-    @staticmethod
-    def _buffer(item: dict[str, Any], folder: Path, chunk: bytes) -> bytes:
-        """The bytes of a buffer: the file's own chunk, in the text, or a file in its folder."""
-        uri = item.get("uri")
+    def _buffer(self, index: int) -> bytes:
+        """The bytes of a buffer, read once: the file's own chunk, in the text, or a file beside."""
+        uri = self.tree["buffers"][index].get("uri")
+        key = index if uri is None else uri
+        if key not in self.buffers:
+            self.buffers[key] = self._loaded(index, uri)
+        return self.buffers[key]
+
+    def _loaded(self, index: int, uri: str | None) -> bytes:
+        folder = self.folder
         if uri is None:
-            return chunk
+            if index or not self.chunk:  # a place holder for what an extension decodes
+                raise InputError("has a buffer without data; export it uncompressed")
+            return self.chunk
         if uri.startswith("data:"):
             return base64.b64decode(uri.partition(",")[2])
         path = (folder / unquote(uri)).resolve()
         if not path.is_relative_to(folder.resolve()) or not path.is_file():
             raise InputError(f"its buffer {uri[:80]!r} is not a file beside it")
-        return path.read_bytes()
+        data = path.read_bytes()
+        self.size += len(data)
+        return data
 
     def accessor(self, index: int) -> FloatArray | IntArray:
         """(n, width) values; normalized whole numbers become fractions."""
@@ -89,7 +111,7 @@ class _Gltf:
         width = GLTF_WIDTHS[item["type"]]
         stride = view.get("byteStride", width * kind.itemsize)
         start = view.get("byteOffset", 0) + item.get("byteOffset", 0)
-        raw = self.buffers[view["buffer"]]
+        raw = self._buffer(view["buffer"])
         count = item["count"]
         if count < 1 or start < 0 or stride < width * kind.itemsize:
             raise InputError("has an accessor of impossible size")
@@ -114,7 +136,7 @@ class _Gltf:
             if scenes
             else [index for index in range(len(nodes)) if index not in children]
         )
-        placed = []
+        placed: list[tuple[dict[str, Any], FloatArray]] = []
         waiting = [(index, np.eye(4)) for index in reversed(roots)]
         visited: set[int] = set()  # nodes form trees; a file in which they do not must not hang
         while waiting:
@@ -126,14 +148,50 @@ class _Gltf:
             transform = outer @ _node_transform(node)
             if "mesh" in node:
                 primitives = self.tree["meshes"][node["mesh"]]["primitives"]
-                placed += [(primitive, transform) for primitive in primitives]
+                places = [transform @ local for local in self._instances(node)]
+                check_decoded(128 * (len(placed) + len(places) * len(primitives)), self.size)
+                placed += [(primitive, place) for place in places for primitive in primitives]
             waiting += [(child, transform) for child in reversed(node.get("children", []))]
         return placed
+
+    def _instances(self, node: dict[str, Any]) -> list[FloatArray]:
+        """(4, 4) transforms of the copies of a node's mesh (EXT_mesh_gpu_instancing), or one."""
+        extension = node.get("extensions", {}).get("EXT_mesh_gpu_instancing")
+        if extension is None:
+            return [np.eye(4)]
+        names = {"TRANSLATION": "translation", "ROTATION": "rotation", "SCALE": "scale"}
+        given = {
+            names[name]: self.accessor(index)
+            for name, index in extension["attributes"].items()
+            if name in names
+        }
+        if len({len(values) for values in given.values()}) != 1:
+            raise InputError("has instances without a number of their own")
+        rows = zip(*given.values(), strict=True)
+        return [_node_transform(dict(zip(given, row, strict=True))) for row in rows]
+
+    def _texture(self, primitive: dict[str, Any]) -> tuple[str, FloatArray]:
+        """The UV set of a primitive's base colour, and its (2, 3) transform."""
+        index = primitive.get("material")
+        material = {} if index is None else self.tree["materials"][index]
+        named = ("normalTexture", "occlusionTexture", "emissiveTexture")
+        textures = [material.get("pbrMetallicRoughness", {}).get("baseColorTexture")]
+        textures += [material.get(name) for name in named]
+        texture: dict[str, Any] = next((item for item in textures if item), {})
+        moved = texture.get("extensions", {}).get("KHR_texture_transform", {})
+        name = f"TEXCOORD_{moved.get('texCoord', texture.get('texCoord', 0))}"
+        if name not in primitive["attributes"]:
+            name = "TEXCOORD_0"
+        (x, y), (width, height) = moved.get("offset", (0, 0)), moved.get("scale", (1, 1))
+        sine, cosine = np.sin(moved.get("rotation", 0)), np.cos(moved.get("rotation", 0))
+        return name, np.array(
+            [[width * cosine, height * sine, x], [-width * sine, height * cosine, y]]
+        )
 
     def content(self) -> Content:
         """The scene as one content."""
         positions, corners, uvs, uv_corners, points = [], [], [], [], []
-        vertex_count = uv_count = 0
+        vertex_count = uv_count = decoded = 0
         for primitive, transform in self.placed_primitives():
             attributes = primitive["attributes"]
             local = self.accessor(attributes["POSITION"])
@@ -150,14 +208,21 @@ class _Gltf:
                 if "indices" in primitive
                 else np.arange(len(place))
             )
-            triangles = _mode_triangles(mode, run).reshape(-1)
+            turned = _mode_triangles(mode, run)
+            if np.linalg.det(transform[:3, :3]) < 0:  # a mirror image turns the faces round
+                turned = turned[:, ::-1]
+            triangles = turned.reshape(-1)
+            decoded += place.nbytes + triangles.nbytes
+            check_decoded(4 * decoded, self.size)
             if len(triangles) and (triangles.min() < 0 or triangles.max() >= len(place)):
                 raise InputError(f"a vertex index is out of range (0 to {len(place) - 1})")
             positions.append(place)
             corners.append(triangles + vertex_count)
             vertex_count += len(place)
-            if "TEXCOORD_0" in attributes:
-                uv = np.asarray(self.accessor(attributes["TEXCOORD_0"]), dtype=np.float64)
+            uv_set, uv_transform = self._texture(primitive)
+            if uv_set in attributes:
+                given = np.asarray(self.accessor(attributes[uv_set]), dtype=np.float64)
+                uv = given @ uv_transform[:, :2].T + uv_transform[:, 2]
                 if len(uv) != len(place):
                     raise InputError(f"{len(uv)} UV for {len(place)} vertices")
                 uvs.append(np.stack([uv[:, 0], 1 - uv[:, 1]], axis=1))

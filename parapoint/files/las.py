@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 import struct
 
 import numpy as np
@@ -10,6 +11,12 @@ import numpy as np
 from parapoint.errors import InputError
 from parapoint.files.attributes import named_attributes
 from parapoint.files.content import Content, points_content
+from parapoint.files.decoding import check_decoded
+
+NOISE = (7, 18)
+"""Classes of points that are noise, low and high, by the LAS specification."""
+
+logger = logging.getLogger("parapoint")
 
 
 def las(data: bytes) -> Content:
@@ -30,11 +37,23 @@ def las(data: bytes) -> Content:
         raise InputError(f"ends early: {points} points are announced")
     if 54 * records + 60 * extended > len(data):
         raise InputError(f"ends early: {records + extended} variable records are announced")
+    check_decoded(width * points, len(data))
+    if compressed and not laspy.LazBackend.detect_available():
+        raise InputError("is LAZ, which needs a decoder; pip install lazrs")
     read = laspy.read(io.BytesIO(data))
+    kept = np.ones(len(read.points), dtype=bool)
+    if len(kept):
+        kept = ~np.isin(read.classification, NOISE) & (np.asarray(read.withheld) == 0)
+    if len(kept) and not kept.any():
+        raise InputError("has no point that is neither noise nor withheld")
+    if not kept.all():
+        logger.warning(
+            "%d of %d points left out: classed as noise, or withheld", (~kept).sum(), len(kept)
+        )
     names = [name for name in read.point_format.dimension_names if name not in "XYZ"]
-    columns = {name: np.asarray(read[name]) for name in names}
+    columns = {name: np.asarray(read[name])[kept] for name in names}
     if all(name in columns and not columns[name].any() for name in ("red", "green", "blue")):
         for name in ("red", "green", "blue"):  # room for colours that were never taken
             del columns[name]
-    points = np.asarray(read.xyz, dtype=np.float64)
+    points = np.asarray(read.xyz, dtype=np.float64)[kept]
     return points_content(points, attributes=named_attributes(columns))

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from parapoint.errors import InputError
 from parapoint.files.attributes import named_attributes
 from parapoint.files.content import Content, points_content
+from parapoint.files.decoding import check_decoded
 from parapoint.files.xyz import table, text_lines
 
 PACKED = {"rgb": 3, "rgba": 4}
@@ -48,9 +49,10 @@ def pcd(data: bytes) -> Content:
             packed, unpacked = struct.unpack_from("<II", body)
             if unpacked != size:
                 raise InputError(f"holds {unpacked} bytes for {count} points of {size} bytes")
+            check_decoded(size, len(body))
             body = lzf_decompressed(body[8 : 8 + packed], size)
             offsets = [count * offset for offset in offsets]  # one field after the other
-            strides = [kind.itemsize for kind in kinds]
+            strides = [kind.itemsize * n for kind, n in zip(kinds, counts, strict=True)]
         if len(body) < size:
             raise InputError(f"ends early: {count} points take {size} bytes")
         columns = {
@@ -79,16 +81,20 @@ def _pcd_attributes(columns: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArr
 def _pcd_header(
     data: bytes,
 ) -> tuple[list[str], list[np.dtype[np.generic]], list[int], int, str, bytes]:
-    """Field names, types and counts, number of points, encoding, and the bytes behind."""
+    """Field names, types and counts, number of points, encoding, and the bytes behind.
+
+    A field of COUNT 0, as lidar drivers write for padding, takes no room.
+    """
     header: dict[str, list[str]] = {}
-    rest = data
+    at = 0
     while "DATA" not in header:
-        line, newline, rest = rest.partition(b"\n")
-        words = line.decode("latin-1").split()
+        end = data.find(b"\n", at)
+        if end < 0:
+            raise InputError("has no PCD header")
+        words = data[at:end].decode("latin-1").split()
+        at = end + 1
         if words and not words[0].startswith("#"):
             header[words[0].upper()] = words[1:]
-        if not newline:
-            raise InputError("has no PCD header")
     fields = header["FIELDS"]
     codes = {"F": "f", "I": "i", "U": "u"}
     kinds = [
@@ -96,13 +102,16 @@ def _pcd_header(
         for kind, size in zip(header["TYPE"], header["SIZE"], strict=True)
     ]
     counts = [int(word) for word in header.get("COUNT", ["1"] * len(fields))]
-    if not len(fields) == len(kinds) == len(counts) or min(counts, default=0) < 1:
+    if not len(fields) == len(kinds) == len(counts) or min(counts, default=-1) < 0:
         raise InputError("has a header whose FIELDS, SIZE, TYPE and COUNT do not agree")
-    count = int(header["POINTS"][0])
+    if "POINTS" in header:
+        count = int(header["POINTS"][0])
+    else:
+        count = int(header["WIDTH"][0]) * int(header.get("HEIGHT", ["1"])[0])
     encoding = header["DATA"][0].lower()
     if count < 0 or encoding not in {"ascii", "binary", "binary_compressed"}:
         raise InputError(f"has {count} points in encoding {encoding[:30]!r}, which is not read")
-    return fields, kinds, counts, count, encoding, rest
+    return fields, kinds, counts, count, encoding, data[at:]
 
 
 def lzf_decompressed(data: bytes, size: int) -> bytes:

@@ -5,7 +5,6 @@ Ours, since trimesh takes PLY triangle strips for points and mixed binary polygo
 
 from __future__ import annotations
 
-import re
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -75,11 +74,12 @@ class _Body:
 
 def ply(data: bytes) -> Content:
     """PLY, text or binary of either byte order: polygons and triangle strips, vertex normals."""
-    match = re.match(rb"ply\s*?\r?\n(.*?)end_header[ \t]*\r?\n", data, re.DOTALL)
-    if match is None:
+    end = data.find(b"end_header")
+    body_begin = data.find(b"\n", end) + 1
+    if not data.startswith(b"ply") or data[3:4].strip() or end < 0 or not body_begin:
         raise InputError("has no PLY header")
-    encoding, elements = _ply_header(match[1].decode("latin-1").splitlines())
-    raw = data[match.end() :]
+    encoding, elements = _ply_header(data[3:end].decode("latin-1").splitlines())
+    raw = data[body_begin:]
     body = _Body(raw, None if encoding else floats(raw.split(), 1).reshape(-1))
     at = 0
     columns: dict[str, npt.NDArray[Any]] = {}

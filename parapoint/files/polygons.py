@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
+import mapbox_earcut
 import numpy as np
 
 from parapoint.files.content import ranges
 from parapoint.surfaces.surface import FloatArray, IntArray
 
+THIN = 1e-9
+"""Share of a polygon's area below which a triangle of its fan counts as folded or flat."""
+
 
 def triangle_rows(vertices: FloatArray, sizes: IntArray, corners: IntArray) -> IntArray:
     """(F, 3) places in `corners` of the triangles of polygons, polygon by polygon.
 
-    A polygon of n corners gives n - 2 triangles, a fan from its first corner; a quad that would
+    A polygon of n corners gives n - 2 triangles, a fan from its first corner. A quad that would
     fold along that diagonal (the two triangles face away from each other) is fanned from its
-    second corner, which is right for every planar quad.
+    second corner, which is right for every planar quad. A larger polygon whose fan would fold, or
+    have a triangle without area, is cut by ears in its mean plane (mapbox/earcut), which is right
+    for every planar polygon, with a bridge to a hole as well.
 
     Args:
         vertices: (V, 3) positions, finite.
@@ -21,10 +29,10 @@ def triangle_rows(vertices: FloatArray, sizes: IntArray, corners: IntArray) -> I
         corners: (sum of sizes,) rows of `vertices`.
     """
     starts = np.cumsum(sizes) - sizes
+    scale = float(np.abs(vertices).max(initial=0)) or 1.0  # products of huge coordinates overflow
     turn = np.zeros(len(sizes), dtype=np.int64)
     quads = np.flatnonzero(sizes == 4)
     if len(quads):
-        scale = float(np.abs(vertices).max()) or 1.0  # products of huge coordinates overflow
         a, b, c, d = (vertices[corners[starts[quads] + k]] / scale for k in range(4))
         first, second = np.cross(b - a, c - a), np.cross(c - a, d - a)
         turn[quads] = (first * second).sum(axis=1) < 0
@@ -32,4 +40,63 @@ def triangle_rows(vertices: FloatArray, sizes: IntArray, corners: IntArray) -> I
     step = ranges(np.ones_like(count), count)
     place = np.stack([np.zeros_like(step), step, step + 1], axis=1)
     start, shift, size = (np.repeat(values, count)[:, None] for values in (starts, turn, sizes))
-    return np.asarray(start + (place + shift) % size)
+    rows = np.asarray(start + (place + shift) % size)
+    first_row = np.cumsum(count) - count
+    for polygon in np.flatnonzero(sizes > 4).tolist():
+        begin, n = int(starts[polygon]), int(sizes[polygon])
+        ring = vertices[corners[begin : begin + n]] / scale
+        if (cut := ears(ring)) is not None:
+            rows[first_row[polygon] : first_row[polygon] + n - 2] = begin + cut
+    return rows
+
+
+def ears(ring: FloatArray) -> IntArray | None:
+    """(n - 2, 3) rows of a polygon (n, 3) as triangles that turn as it does.
+
+    None where the fan from its first corner is right, or where no cut fills the polygon: it
+    crosses itself.
+    """
+    edges = ring[1:] - ring[0]
+    fan = np.cross(edges[:-1], edges[1:])
+    normal = fan.sum(axis=0)
+    length = float(np.linalg.norm(normal))
+    if length == 0 or (fan @ normal > THIN * length**2).all():
+        return None
+    drop = int(np.abs(normal).argmax())
+    x, y = ((1, 2), (2, 0), (0, 1))[drop]
+    plane = (ring - ring[0])[:, [x, y]] * [1.0, np.sign(normal[drop])]
+    found = mapbox_earcut.triangulate_float64(plane, np.array([len(ring)], dtype=np.uint32))
+    triangles = _with_all_corners(np.asarray(found, dtype=np.int64).reshape(-1, 3), len(ring))
+    if len(triangles) != len(ring) - 2:
+        return None
+    a, b, c = plane[triangles].transpose(1, 0, 2)
+    turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
+    triangles[turned] = triangles[turned][:, ::-1]
+    return triangles
+
+
+def _with_all_corners(triangles: IntArray, count: int) -> IntArray:
+    """The triangles (T, 3) of a ring, with the corners inside straight edges that earcut drops.
+
+    A triangle at such an edge becomes a fan over the corners on it.
+    """
+    cut: list[tuple[int, int, int]] = []
+    kept = np.unique(triangles)
+    following = dict(zip(kept.tolist(), np.roll(kept, -1).tolist(), strict=True))
+    waiting = [(int(a), int(b), int(c)) for a, b, c in triangles]
+    while waiting:
+        triangle = waiting.pop()
+        for k in range(3):
+            a, b, c = triangle[k], triangle[(k + 1) % 3], triangle[(k + 2) % 3]
+            p, q = (a, b) if following.get(a) == b else (b, a)
+            if following.get(p) != q or (q - p) % count <= 1:
+                continue
+            steps = [(p + step) % count for step in range((q - p) % count + 1)]
+            fan = list(pairwise(steps))
+            del following[p]
+            following |= dict(fan)
+            waiting += [(i, j, c) for i, j in fan]
+            break
+        else:
+            cut.append(triangle)
+    return np.array(cut, dtype=np.int64).reshape(-1, 3)

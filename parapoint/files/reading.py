@@ -17,6 +17,7 @@ import numpy as np
 
 from parapoint.errors import InputError
 from parapoint.files.content import NO_UV, Content
+from parapoint.files.decoding import plain
 from parapoint.files.gltf import glb, gltf
 from parapoint.files.las import las
 from parapoint.files.obj import obj
@@ -61,7 +62,7 @@ def read_surface(path: str | Path) -> Surface:
     """The surface in a file: a Mesh, or a PointCloud where the file has no faces.
 
     Polygons become triangles in place: a quad is cut along its first diagonal, or along the
-    second if it would fold along the first; larger polygons are fanned from their first corner.
+    second if it would fold along the first; larger polygons that bend inwards are cut by ears.
     STL repeats each vertex in each triangle: equal ones are welded, so that the mesh is connected.
     Points with a NaN or infinite coordinate are dropped with a logged warning, vertices are not.
 
@@ -142,10 +143,7 @@ def _content(path: Path) -> Content:
         raise InputError(f"has an unknown ending; known are {', '.join(FORMATS)}")
     if not path.is_file():
         raise InputError("is not a regular file")
-    data = path.read_bytes()
-    if not data.strip():
-        raise InputError("is empty")
-    return reader(data, path.parent)
+    return reader(plain(path.read_bytes()), path.parent)
 
 
 def _mesh(content: Content) -> tuple[Mesh, IntArray]:

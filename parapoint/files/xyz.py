@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,15 @@ from parapoint.errors import InputError
 from parapoint.files.attributes import colours_of
 from parapoint.files.content import Content, points_content
 from parapoint.surfaces.surface import FloatArray
+
+LOOKED_AT = 20_000
+"""Lines, spread over the file, by which the meaning of its commas is told."""
+DECIMAL_COMMA = re.compile(rb"[+-]?\d*,\d+(?:[eE][+-]?\d+)?$|[+-]?\d+$")
+"""A word with one comma at most, as it is written where the comma marks decimals."""
+GROUPED = re.compile(rb"[+-]?\d{1,3}(?:,\d{3})+\.\d*$")
+"""A number whose thousands are parted by commas; 1,234.5."""
+GROUPED_BY_POINTS = re.compile(rb"[+-]?\d{1,3}(?:\.\d{3})+,\d*$")
+"""The same as it is written where the comma marks decimals; 1.234,5."""
 
 
 def table(lines: list[bytes], columns: tuple[int, ...]) -> FloatArray:
@@ -22,21 +32,80 @@ def table(lines: list[bytes], columns: tuple[int, ...]) -> FloatArray:
 
 
 def text_lines(data: bytes) -> list[bytes]:
-    """Lines that hold more than blanks and comments, commas turned into blanks."""
-    return [
+    """Lines that hold more than blanks and comments, with points for decimals, blanks between.
+
+    Raises:
+        InputError: commas part numbers or mark decimals, and it cannot be told which.
+    """
+    lines = [
         line
-        for line in data.replace(b",", b" ").splitlines()
+        for line in data.replace(b";", b" ").splitlines()
         if line.strip() and not line.lstrip().startswith((b"#", b"//"))
     ]
+    if b"," not in data:
+        return lines
+    looked_at = [line for line in lines[:: len(lines) // LOOKED_AT + 1] if re.search(rb"\d", line)]
+    # A comma with a blank behind it parts numbers, whatever those inside words do.
+    words = [re.sub(rb",(?=\s|$)", b" ", line).split() for line in looked_at]
+    with_comma = [word for line in words for word in line if b"," in word]
+    if with_comma and _marks_decimals(words, with_comma):
+        points = any(GROUPED_BY_POINTS.match(word) for word in with_comma)
+        spaced = (re.sub(rb",(?=\s|$)", b" ", line) for line in lines)
+        if points:
+            spaced = (line.replace(b".", b"") for line in spaced)
+        return [line.replace(b",", b".") for line in spaced]
+    grouped = with_comma and all(GROUPED.match(word) for word in with_comma)
+    if grouped and min(map(len, words)) >= 3:
+        return [re.sub(rb",(?=\d)", b"", line).replace(b",", b" ") for line in lines]
+    return [line.replace(b",", b" ") for line in lines]
+
+
+def _marks_decimals(words: list[list[bytes]], with_comma: list[bytes]) -> bool:
+    """Whether the commas inside words mark decimals.
+
+    Args:
+        words: of each line.
+        with_comma: those that hold a comma.
+    """
+    fewest = min(map(len, words))
+    if fewest >= 3:
+        if all(DECIMAL_COMMA.match(word) or GROUPED_BY_POINTS.match(word) for word in with_comma):
+            return True
+        if any(b"." in word or word.count(b",") > 1 for word in with_comma):
+            return False
+    # One run of whole numbers: 1,5,2,5,3,5 may be three numbers or six.
+    parts = [word.split(b",") for word in with_comma]
+    if {len(line) for line in words if not any(b"," in word for word in line)} & set(
+        map(len, parts)
+    ):
+        return False  # other lines have as many numbers, parted by blanks
+    is_whole = all(part.lstrip(b"+-").isdigit() for word in parts for part in word)
+    signed = any(part.startswith((b"+", b"-")) for word in parts for part in word[1::2])
+    if is_whole and not signed and (fewest > 1 or max(map(len, parts)) >= 6):
+        raise InputError(
+            "has commas of which it cannot be told whether they part numbers or mark decimals; "
+            "write decimals with points, and blanks between the numbers"
+        )
+    return False
+
+
+def point_lines(data: bytes) -> list[bytes]:
+    """Lines with numbers: without a heading, and without the counts before each scan.
+
+    Raises:
+        InputError: there is none; see `text_lines`.
+    """
+    lines = [line for line in text_lines(data) if not line.strip().isdigit()]
+    if lines and not re.search(rb"\d", lines[0]):
+        lines = lines[1:]  # names of the columns
+    if not lines:
+        raise InputError("has no point")
+    return lines
 
 
 def xyz(data: bytes) -> Content:
     """Text with x y z in each line, and whatever columns a scanner adds; see `_further_columns`."""
-    lines = text_lines(data)
-    if lines and len(lines[0].split()) == 1:
-        lines = lines[1:]  # a count on its own, as scanners write it
-    if not lines:
-        raise InputError("has no point")
+    lines = point_lines(data)
     try:
         values = table(lines, tuple(range(len(lines[0].split()))))
     except ValueError:  # words, or not in all lines: the coordinates alone
@@ -76,7 +145,7 @@ def _further_columns(
 
 
 def pts(data: bytes) -> Content:
-    """PTS: lines "p x y z" (Hoppe), or a count and then x y z and what a scanner adds."""
+    """PTS: lines "p x y z" (Hoppe), or of each scan a count, x y z and what a scanner adds."""
     lines = text_lines(data)
     marked = [line for line in lines if line.startswith(b"p ")]
     return points_content(table(marked, (1, 2, 3))) if marked else xyz(data)

@@ -197,7 +197,7 @@ LEARNED = Preset(
     area_weight=0.02,
     map_weight=2.0,
     jacobian_weight=1.0,
-    inverse_weight=0.3,
+    inverse_weight=1.0,
     optimizer="soap",
     learning_rate=1e-2,
 )
@@ -210,7 +210,12 @@ LEARNED = Preset(
 - Losses: the conformal and the anti-flip term look at the map of the points (`unfolding_loss`)
   and not at that of the plane; areas count a little.
 
-docs/METHOD.md has what each change was measured to bring."""
+On three_man_statue, on which the numbers were chosen (seed 0), angle difference off the spanning
+faces. After 60 s of a core: a leaky ReLU 0.276, the squareplus 0.103, and with features of up to 16
+radians a radius in place of 8 0.087. After 100 s: with FLOOR of the gates 0.082 in place of 0.098;
+without noise on the points and the unfolding loss 0.096 in place of 0.094, and 2.3 % of the faces
+flipped in place of 1.2 %. A cycle weight of 0.03 draws Deform's lattice together.
+docs/METHOD.md has more."""
 
 LEARNED_FROM_HULL = Preset(
     activation="squareplus",

@@ -30,6 +30,7 @@ from reports.pictures.style import (
     small_multiples,
     wrapped,
 )
+from reports.ranking import may_rank
 
 
 def losses(contents: Contents, cases: Sequence[str]) -> Figure | None:
@@ -173,9 +174,11 @@ def pareto(contents: Contents, cases: Sequence[str]) -> Figure | None:
                 at = [max(float(record[AREA]), 1e-4)], [max(float(record[ANGLE]), 1e-6)]
                 place.plot(*at, label=label.short, **style)
         own = own[~own.index.isin(contents.atlases)]
+        own = own[[may_rank(found, angles=False) for found in own["grade"]]]
         points = own[[AREA, ANGLE]].clip(lower=[1e-4, 1e-6]).sort_values(AREA).to_numpy(dtype=float)
-        best = np.minimum.accumulate(points[:, 1])
-        place.step(points[:, 0], best, where="post", color="0.6", linewidth=0.8, zorder=1)
+        if len(points):
+            best = np.minimum.accumulate(points[:, 1])
+            place.step(points[:, 0], best, where="post", color="0.6", linewidth=0.8, zorder=1)
         place.set_yscale("log")
         plain_log(place.yaxis)
         right = place.get_xlim()[1]

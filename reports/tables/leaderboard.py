@@ -24,6 +24,7 @@ from reports.contents import (
     Label,
 )
 from reports.pictures.drawing import slug
+from reports.ranking import is_of_angles, may_rank
 from reports.tables.table import metric_column
 
 MEASURES = {
@@ -61,13 +62,14 @@ class Winner:
 def winner(contents: Contents, case: str, metric: str) -> Winner | None:
     """The best value of `metric` on a model among the methods with one chart; None without any.
 
-    Equal is what is equal to three digits.
+    Maps whose grade is too low for that (`reports.ranking`) take no part. Equal is what is equal
+    to three digits.
     """
     column = metric_column(metric)
     values = {
         str(record["label"]): float(record[metric])
         for record in _by_case(contents).get(case, ())
-        if math.isfinite(record[metric])
+        if math.isfinite(record[metric]) and may_rank(record["grade"], angles=is_of_angles(metric))
     }
     if not values or (metric == "bijective" and max(values.values()) < 1):
         return None
@@ -172,6 +174,7 @@ def _about(name: str) -> dict[str, object]:
         "better": column.better or "lower",
         "digits": column.digits,
         "percent": column.percent,
+        "angles": column.angles,
         "definition": definition(name),
     }
 
@@ -189,6 +192,7 @@ def _suite(contents: Contents, names: Sequence[str]) -> dict[str, object]:
                 "seed": row.seed,
                 "status": row.status.replace("_", " "),
                 "reason": row.reason,
+                "grade": by_id[row.id]["grade"] or "",
                 "values": [_number(by_id[row.id], name) for name in names],
             }
             for row in contents.rows

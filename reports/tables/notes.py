@@ -26,6 +26,23 @@ def environment_note(contents: Contents) -> str:
     return f"Run on: {places}. Seeds: {', '.join(map(str, seeds))}."
 
 
+def grade_notes(contents: Contents) -> list[str]:
+    """Which maps are broken and thus not ranked, and which are collapsed."""
+    notes = []
+    for grade, meaning in (
+        ("broken", "broken, so not ranked"),
+        ("collapsed", "collapsed (a part of the surface is shrunk to nothing), ranked by angles"),
+    ):
+        found = [
+            f"{label} on {case}"
+            for (case, label), record in contents.records.items()
+            if record["grade"] == grade
+        ]
+        if found:
+            notes.append(f"{meaning.capitalize()}: {', '.join(found)}.")
+    return notes
+
+
 def method_notes(contents: Contents) -> list[str]:
     """What was done to a surface before a method saw it, and which methods are no rivals."""
     notes = []

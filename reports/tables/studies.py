@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
+from benchmarks.metrics.grades import BOUNDS
 from parapoint.surfaces.preparation import CUT
 from reports.contents import (
     ANGLE,
@@ -74,9 +75,12 @@ def success(contents: Contents) -> Table:
             row[f"{name} ok"] = _share(sum(record["ok"] > 0 for record in own), len(own))
             bijective = sum(number(record, BIJECTIVE) == 1 for record in own)
             row[f"{name} {BIJECTIVE}"] = _share(bijective, len(own))
+            usable = sum(record["grade"] == "usable" for record in own)
+            row[f"{name} usable"] = _share(usable, len(own))
         rows.append(row)
     columns = [Column("method", "Method", text=True)]
     for name, cases in groups.items():
+        columns.append(Column(f"{name} usable", "usable", text=True, group=f"{name}: {len(cases)}"))
         columns.append(Column(f"{name} ok", "ok", text=True, group=f"{name}: {len(cases)}"))
         if not contents.clouds.issuperset(cases):
             one = Column(f"{name} {BIJECTIVE}", "1 to 1", text=True, group=f"{name}: {len(cases)}")
@@ -85,13 +89,19 @@ def success(contents: Contents) -> Table:
         name="success",
         title="Success by kind of surface",
         caption=(
-            "By kind of surface (number of models): on how many models the method ended well with "
+            "By kind of surface (number of models): how many maps are usable, which alone is a "
+            "success; on how many models the method ended well with "
             "at least one seed, and on how many of them its maps are one to one (no face flipped, "
             "degenerate or over another); of those it was asked for, skipped ones included."
         ),
         columns=tuple(columns),
         blocks=(tuple(rows),),
-        notes=(legend(contents), *failure_notes(contents), environment_note(contents)),
+        notes=(
+            f"Grades: {BOUNDS}.",
+            legend(contents),
+            *failure_notes(contents),
+            environment_note(contents),
+        ),
     )
 
 

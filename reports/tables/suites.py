@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from benchmarks.metrics.grades import BOUNDS
 from parapoint.surfaces.preparation import CUT
 from reports.contents import (
     ANGLE,
@@ -14,10 +15,12 @@ from reports.contents import (
     POINT_COLLISIONS,
     POINT_TEARS,
     SPANNING,
+    WORST_PART,
     Contents,
     number,
 )
-from reports.tables.notes import environment_note, failure_notes, legend, method_notes
+from reports.ranking import may_rank
+from reports.tables.notes import environment_note, failure_notes, grade_notes, legend, method_notes
 from reports.tables.published import AUTHORS, Verdict, claim_text, published_values, verdicts
 from reports.tables.studies import (
     ablation,
@@ -28,6 +31,9 @@ from reports.tables.studies import (
     success,
 )
 from reports.tables.table import Column, Table, Value, metric_column, metric_title
+
+MOST_LEFT_OUT = 0.1
+"""Share of a method's maps that may be unfit for a rank before its means take no part in ranks."""
 
 SUMMARY_METRICS = (
     ANGLE,
@@ -59,7 +65,9 @@ def conformality(contents: Contents) -> Table | None:
         return None
     columns = [Column("case", "Model", text=True)]
     columns += [
-        Column(label.short, label.short, better="lower", digits=4, group="Measured here")
+        Column(
+            label.short, label.short, better="lower", digits=4, group="Measured here", angles=True
+        )
         for label in contents.methods
     ]
     authors = [
@@ -81,6 +89,7 @@ def conformality(contents: Contents) -> Table | None:
             value = number(record, ANGLE)
             status = str(record["status"]).replace("_", " ") if record else ""
             row[label.short] = value if value is not None else (status if status != "ok" else "")
+            row[f"grade {label.short}"] = str(record["grade"] or "") if record else ""
         for author, value in published_values(case).items():
             row[f"published {author}"] = value
         rows.append(row)
@@ -99,6 +108,7 @@ def conformality(contents: Contents) -> Table | None:
         set_apart=contents.atlases,
         notes=(
             legend(contents),
+            *grade_notes(contents),
             *method_notes(contents),
             *_published_notes(authors),
             environment_note(contents),
@@ -130,10 +140,12 @@ def supplement(contents: Contents) -> Table | None:
     columns = [
         Column("case", "Model", text=True, once=True),
         Column("method", "Method", text=True),
+        Column("grade", "Grade", text=True),
         metric_column(ANGLE, "all faces", group="Angle difference [rad]"),
         metric_column(without, "no spanning", group="Angle difference [rad]"),
         metric_column(AREA, "all faces", group="Area discrepancy [0–2]"),
         metric_column(area_without, "no spanning", group="Area discrepancy [0–2]"),
+        metric_column(WORST_PART, "worst part", digits=2),
         metric_column(FLIPPED, "flipped %"),
         Column(SPANNING, "spanning %", digits=2, percent=True),
         Column("chart_count", "charts", digits=0),
@@ -165,9 +177,10 @@ def supplement(contents: Contents) -> Table | None:
                 "method": label.text + cut,
                 **{
                     name: number(record, name)
-                    for name in (ANGLE, without, AREA, area_without, FLIPPED)
+                    for name in (ANGLE, without, AREA, area_without, WORST_PART, FLIPPED)
                 },
                 "label": label.short,
+                "grade": str(record["grade"] or ""),
                 **{name: number(record, name) for name in (SPANNING, "chart_count", "seam_length")},
                 "seconds": number(record, "seconds"),
                 "done": f"{record['ok']}/{record['tried']}" if record["tried"] else "skipped",
@@ -194,6 +207,7 @@ def supplement(contents: Contents) -> Table | None:
         blocks=tuple(blocks),
         set_apart=contents.atlases,
         notes=(
+            f"Grades: {BOUNDS}.",
             *method_notes(contents),
             *_published_notes(authors),
             *failure_notes(contents),
@@ -228,6 +242,7 @@ def comparison(contents: Contents, names: Sequence[str] = ()) -> Table:
             shared = own[own["case"].isin(common)][name].dropna()
             tried = means[means["label"] == label.short]
             worst = values.max() if column.better != "higher" else values.min()
+            unfit = [not may_rank(found, angles=column.angles) for found in own["grade"]]
             rows.append(
                 {
                     "metric": metric_title(name),
@@ -240,6 +255,9 @@ def comparison(contents: Contents, names: Sequence[str] = ()) -> Table:
                     "count": f"{len(values)}/{int((tried['tried'] > 0).sum())}",
                     "skipped": float((tried["skipped"] > 0).sum()),
                     "better": column.better,
+                    "angles": str(column.angles or ""),
+                    "grade": "broken" if sum(unfit) > MOST_LEFT_OUT * len(unfit) else "",
+                    "invalid": float(sum(unfit)),
                 }
             )
         blocks.append(tuple(rows))
@@ -260,6 +278,7 @@ def comparison(contents: Contents, names: Sequence[str] = ()) -> Table:
             Column("worst", "worst", better="lower", digits=4),
             Column("common", "common mean", better="lower", digits=4),
             Column("count", "ok / tried", text=True),
+            Column("invalid", "not rankable", digits=0),
             Column("skipped", "skipped", digits=0),
         ),
         blocks=tuple(blocks),

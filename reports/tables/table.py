@@ -9,10 +9,12 @@ from functools import cached_property
 from typing import Literal, NamedTuple
 
 from benchmarks.metrics.table import METRICS
+from reports.ranking import is_of_angles, may_rank, ranks
 
 Value = float | str | None
 Mark = Literal["", "best", "second"]
 
+MARKS: dict[int | None, Mark] = {1: "best", 2: "second"}
 ARROWS = {"lower": "↓", "higher": "↑"}
 
 
@@ -29,6 +31,7 @@ class Column:
         once: whether the value is that of the whole block, printed in its first row.
         group: a head over neighbouring columns with the same group.
         text: whether it holds words, set to the left.
+        angles: whether its values read angles alone, so that collapsed maps are ranked in it.
     """
 
     key: str
@@ -39,6 +42,7 @@ class Column:
     once: bool = False
     group: str = ""
     text: bool = False
+    angles: bool = False
 
     @property
     def head(self) -> str:
@@ -114,7 +118,7 @@ class Table:
         else:
             groups = [[(r, c) for r in rows] for c in ranked]
         for group in groups:
-            _rank(group, block, columns, texts, marks)
+            _mark(group, block, columns, texts, marks)
         return tuple(
             tuple(
                 Cell(texts[r][c], marks[r][c], row.get(column.key))
@@ -124,31 +128,38 @@ class Table:
         )
 
 
-def _rank(
+def _mark(
     places: Sequence[tuple[int, int]],
     block: Sequence[Mapping[str, Value]],
     columns: Sequence[Column],
     texts: Sequence[Sequence[str]],
     marks: list[list[Mark]],
 ) -> None:
-    """Mark the best and the second of the values at `places`; what prints alike ranks alike.
+    """Mark the best and the second of the values at `places`.
 
-    A row whose values have a direction of their own gives it under "better".
+    A row whose values have a direction of their own gives it under "better", its grade under
+    "grade", or column by column under "grade KEY".
     """
-    numbers: dict[tuple[int, int], float] = {}
+    values: list[float | None] = []
     for row, column in places:
-        value = block[row].get(columns[column].key)
-        if isinstance(value, int | float) and math.isfinite(value):
-            better = block[row].get("better", columns[column].better)
-            numbers[row, column] = value if better == "lower" else -value
-    order = list(dict.fromkeys(texts[r][c] for r, c in sorted(numbers, key=numbers.__getitem__)))
-    if len(order) < 2:
+        value, of = block[row].get(columns[column].key), columns[column]
+        grade = block[row].get(f"grade {of.key}", block[row].get("grade"))
+        angles = bool(block[row].get("angles", of.angles))
+        ranked = isinstance(value, int | float) and may_rank(_text(grade), angles=angles)
+        values.append(float(value) if ranked and isinstance(value, int | float) else None)
+    if not places:
         return
-    for row, column in numbers:
-        if texts[row][column] == order[0]:
-            marks[row][column] = "best"
-        elif texts[row][column] == order[1]:
-            marks[row][column] = "second"
+    better = {str(block[row].get("better", columns[column].better)) for row, column in places}
+    shown = [texts[row][column] for row, column in places]
+    found = ranks(values, shown, better.pop())
+    if len({text for text, rank in zip(shown, found, strict=True) if rank}) < 2:
+        return  # all are alike: nobody is best
+    for (row, column), rank in zip(places, found, strict=True):
+        marks[row][column] = MARKS.get(rank, "")
+
+
+def _text(value: Value) -> str | None:
+    return value if isinstance(value, str) else None
 
 
 def grouped(columns: Sequence[Column]) -> list[tuple[str, int]]:
@@ -175,6 +186,7 @@ def metric_column(name: str, title: str = "", **given: object) -> Column:
         better=metric.better if metric.better in ARROWS else "",
         digits=2 if name.endswith("_fraction") else digits,
         percent=name.endswith("_fraction"),
+        angles=is_of_angles(name),
     )
     return Column(**{**column.__dict__, **given})
 

@@ -11,6 +11,7 @@ from parapoint import ComputedMap, PointCloud, cli
 from parapoint.commands.output import write
 from parapoint.files.point_writers import write_points
 from parapoint.files.reading import read_parameterized, read_surface
+from parapoint.textures.preview import SIDE
 
 COUNT = 400
 
@@ -72,7 +73,7 @@ def test_a_scan_becomes_a_textured_model_in_one_command(scan, tmp_path, capsys) 
 @pytest.mark.parametrize("ending", [".obj", ".ply"])
 def test_the_texture_shows_each_point_in_its_colour(ending, model, bowl, tmp_path) -> None:
     target = tmp_path / f"a{ending}"
-    write(model, bowl, str(target), 256)
+    write(model, bowl, str(target), texture=256)
     picture = np.asarray(Image.open(tmp_path / "a.png"))
     assert picture.shape == (256, 256, 3)
     if ending == ".ply":
@@ -88,10 +89,22 @@ def test_the_texture_shows_each_point_in_its_colour(ending, model, bowl, tmp_pat
 
 
 def test_a_cloud_without_colours_gets_a_checkerboard(model, bowl, tmp_path) -> None:
-    facts = write(model, PointCloud(bowl.points), str(tmp_path / "a.ply"), 64)
+    facts = write(model, PointCloud(bowl.points), str(tmp_path / "a.ply"), texture=64)
     assert "texture_fill" not in facts
     values = np.unique(np.asarray(Image.open(tmp_path / "a.png")))
     assert values.tolist() == [70, 235]
+
+
+@pytest.mark.parametrize("ending", [".glb", ".npz"])
+def test_a_preview_shows_the_surface_beside_its_layout(ending, model, bowl, tmp_path) -> None:
+    write(model, bowl, str(tmp_path / f"a{ending}"), texture=64, preview=tmp_path / "p.png")
+    picture = np.asarray(Image.open(tmp_path / "p.png"))
+    assert picture.shape == (SIDE, 3 * SIDE, 3)
+    for third in np.split(picture, 3, axis=1):
+        white = (third == 255).all(axis=2)
+        assert not white[SIDE // 2, SIDE // 2]
+        assert 0.1 < white.mean() < 0.9
+        assert white[0, 0]
 
 
 def test_points_keep_what_is_known_of_them(model, bowl, tmp_path) -> None:
@@ -122,7 +135,7 @@ def test_bake_of_a_saved_model(kind, model, scan, tmp_path, capsys) -> None:
 
 
 def test_bake_of_a_mesh_is_of_its_own_uv(model, bowl, scan, tmp_path, capsys) -> None:
-    write(model, bowl, str(tmp_path / "mesh.obj"), 64)
+    write(model, bowl, str(tmp_path / "mesh.obj"), texture=64)
     first = ["bake", tmp_path / "mesh.obj", scan, "--map", "colour", "--texture", 64]
     assert run([*first, "--out", tmp_path / "b.png", "--json"], capsys)[0] == 0
     # 64 texels leave a quarter of a texel free around the map, as unwrap does.
@@ -145,6 +158,9 @@ def test_bake_of_a_mesh_is_of_its_own_uv(model, bowl, scan, tmp_path, capsys) ->
             ["unwrap", "SCAN", "--out", "mine.ply", "--texture", "64"],
             "is a file of yours",
         ),
+        (["unwrap", "SCAN", "--out", "a.glb", "--preview", "a.jpg"], "written as .png"),
+        (["unwrap", "SCAN", "--out", "a.obj", "--preview", "a.png"], "is the texture of"),
+        (["unwrap", "SCAN", "--out", "a.glb", "--preview", "no/a.png"], "no such folder"),
         (["bake", "MESH", "SCAN", "--out", "a.jpg", "--map", "colour"], "written as .png"),
         (["bake", "MESH", "SCAN", "--out", "a.png", "--map", "gloss"], "--map must be one of"),
         (

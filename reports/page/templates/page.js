@@ -95,15 +95,20 @@
     return values.length ? mean(values) : null;
   }
 
-  // Best and second of what is comparable, by what is printed.
+  // Competition ranks among what is comparable, by what is printed: two firsts have no second.
   function rank(entries, metric) {
     const known = entries.filter(({ value, apart }) => value !== null && Number.isFinite(value) && !apart);
-    if (known.length < 2) return;
-    const order = [...new Set(known.map(({ value }) => value))].sort((a, b) => (metric.better === "higher" ? b - a : a - b));
-    const texts = [...new Set(order.map((value) => printed(value, metric)))];
-    if (texts.length < 2) return; // all are equal
-    for (const entry of known) entry.mark = { [texts[0]]: "best", [texts[1]]: "second" }[entry.text] ?? "";
+    if (new Set(known.map(({ text }) => text)).size < 2) return; // all are equal
+    known.sort((a, b) => (metric.better === "higher" ? b.value - a.value : a.value - b.value));
+    let place = 0;
+    known.forEach((entry, at) => {
+      if (at === 0 || entry.text !== known[at - 1].text) place = at + 1;
+      entry.mark = { 1: "best", 2: "second" }[place] ?? "";
+    });
   }
+
+  // Whether cells may be ranked by a metric: no broken map ever, a collapsed one by angles alone.
+  const mayRank = (cells, metric) => cells.every(({ grade }) => grade !== "broken" && (metric.angles || grade !== "collapsed"));
 
   function counts(cells) {
     const found = {};
@@ -130,7 +135,8 @@
         ...metrics().map((metric) => {
           const values = (own ? models : common).map((model) => overSeeds(of(method, model), metric)).filter((value) => value !== null);
           const value = values.length ? statistic(values, metric.better) : null;
-          return { text: printed(value, metric), value, apart: method.atlas };
+          const invalid = all.filter((cell) => !mayRank([cell], metric)).length;
+          return { text: printed(value, metric), value, apart: method.atlas || invalid > all.length / 10 };
         }),
       ];
     });
@@ -150,7 +156,8 @@
         const value = overSeeds(own, metric);
         const bad = own.find((cell) => cell.status !== "ok");
         if (value === null && bad) return { text: bad.status, value: null, title: bad.reason, mark: "bad" };
-        return { text: own.length ? printed(value, metric) : "", value, apart: method.atlas };
+        const grade = own.map((cell) => cell.grade).find((found) => found === "broken" || found === "collapsed") ?? "";
+        return { text: own.length ? printed(value, metric) : "", value, title: grade, apart: method.atlas || !mayRank(own, metric) };
       });
       rank(entries, metric);
       return [{ text: model.name, link: model.page, words: true }, ...entries];

@@ -25,7 +25,7 @@ def test_cases_and_methods_exist(name):
 
 def test_the_suites():
     expected = {"smoke", "builtin", "paper", "disk", "closed", "genus", "cad", "wild", "scans"}
-    expected |= {"artist", "core", "ablation", "quality", "noise", "cuts", "neural"}
+    expected |= {"artist", "core", "ablation", "quality", "seeds", "noise", "cuts", "neural"}
     assert expected == set(SUITES)
     assert SUITES["builtin"].cases == tuple(BUILTIN)
     assert len(SUITES["paper"].cases) == 6

@@ -38,7 +38,7 @@ def trainer(start: Start, **changes: object) -> TaughtTrainer:
 
 @pytest.fixture(scope="module")
 def taught(start: Start) -> SubNetworks:
-    run = trainer(start, iterations=300, learning_rate=1.5e-2)
+    run = trainer(start, iterations=200, learning_rate=2e-2)
     for _ in run.run():
         pass
     assert isinstance(run.networks, SubNetworks)
@@ -106,7 +106,7 @@ def test_every_network_is_trained(start: Start) -> None:
 
 
 def test_gates_learn_the_banks_and_stay(start: Start) -> None:
-    run = trainer(start, iterations=700)
+    run = trainer(start, iterations=500)
     assert isinstance(run.networks, FeatureNetworks)
     cut = run.networks.cut
     points, gates = (torch.as_tensor(of).float() for of in (start.points, start.gates))
@@ -143,7 +143,7 @@ def test_a_gate_is_shut_where_its_reach_is_small_and_jumps_where_it_is_not() -> 
     )
     seen = []
     cut.offset.register_forward_hook(lambda _, given, __: seen.append(given[0][..., :1]))
-    for reach in (FLOOR, 1 + FLOOR):
+    for reach in (0.0, 1 + FLOOR):
         made = torch.tensor([[[-9.0, reach], [9.0, reach]], [[1.0, 0.0], [1.0, 0.0]]])
         cut.gate.forward = lambda _, made=made: made  # type: ignore[method-assign]
         cut(torch.zeros(2, 2, 3))
@@ -193,3 +193,27 @@ def test_a_taught_model_comes_back_from_its_folder(
     assert_array_equal(again.transform(cap()), model.transform(cap()))
     uv = model.transform(cap())
     assert_array_equal(again.inverse_transform(uv), model.inverse_transform(uv))
+
+
+class KilledError(Exception):
+    pass
+
+
+def test_a_killed_fit_from_a_computed_start_goes_on_where_it_was(
+    monkeypatch: pytest.MonkeyPatch, tmp_path
+) -> None:
+    monkeypatch.setitem(parapoint.presets.PRESETS, "learned", TINY)
+    monkeypatch.setattr("parapoint.learned.checkpoint.CHECKPOINT_SECONDS", 0.0)
+
+    def kill(progress) -> None:
+        if progress.iteration == 5:
+            raise KilledError
+
+    model = ParaPoint(iterations=8, device="cpu")
+    whole = model.fit(cap()).transform(cap())
+    with pytest.raises(KilledError):
+        model.fit(cap(), checkpoint=tmp_path, callback=kill)
+    seen = []
+    model.fit(cap(), checkpoint=tmp_path, callback=lambda now: seen.append(now.iteration))
+    assert seen == [0, 6, 7, 8]  # the start is computed again
+    assert_array_equal(model.transform(cap()), whole)

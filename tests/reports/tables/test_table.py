@@ -31,7 +31,7 @@ def test_best_and_second_by_direction_and_ties_by_what_is_printed():
     assert marks(made) == [
         ["", "best", "", ""],
         ["", "best", "best", ""],
-        ["", "second", "second", ""],
+        ["", "", "second", ""],  # in "a" two share the first place, so this one is third
         ["", "", "", ""],
         ["", "", "", ""],
     ]

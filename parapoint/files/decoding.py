@@ -1,0 +1,64 @@
+"""What stands between a file's bytes and its reader: packing, text encodings, and their bounds."""
+
+from __future__ import annotations
+
+from parapoint.errors import InputError
+
+PACKED = {
+    b"\x1f\x8b": "gzip",
+    b"\x28\xb5\x2f\xfd": "zstd",
+    b"BZh": "bzip2",
+    b"\xfd7zXZ": "xz",
+    b"PK\x03\x04": "zip",
+    b"7z\xbc\xaf": "7z",
+}
+"""First bytes of packed files, by the name of the tool that unpacks them."""
+MARKS = {
+    b"\xff\xfe\x00\x00": "utf-32",
+    b"\x00\x00\xfe\xff": "utf-32",
+    b"\xff\xfe": "utf-16",
+    b"\xfe\xff": "utf-16",
+}
+"""Byte order marks that begin a text, and its encoding."""
+DECODED_LEAST = 64 * 2**20
+"""Bytes that any file may decode to."""
+DECODED_TIMES = 32
+"""A larger file may decode to so many times its own size."""
+
+
+def plain(data: bytes) -> bytes:
+    """The data without a byte order mark, and as UTF-8 where they were UTF-16 or UTF-32.
+
+    Raises:
+        InputError: the data are empty or packed by another tool; the message names it.
+    """
+    for first, tool in PACKED.items():
+        if data.startswith(first):
+            raise InputError(f"is packed by {tool}; unpack it first")
+    for mark, encoding in MARKS.items():
+        if data.startswith(mark):
+            try:
+                data = data.decode(encoding).encode()
+            except UnicodeDecodeError:
+                break  # a binary file that happens to begin so
+    data = data.removeprefix(b"\xef\xbb\xbf")
+    if not data.strip():
+        raise InputError("is empty")
+    return data
+
+
+def check_decoded(size: int, file_size: int) -> None:
+    """Check, before any memory is taken, that a file decodes to no more than it may.
+
+    Args:
+        size: bytes that it decodes to.
+        file_size: bytes of the file.
+
+    Raises:
+        InputError: that is more than DECODED_LEAST and DECODED_TIMES the file's own size.
+    """
+    if size > max(DECODED_LEAST, DECODED_TIMES * file_size):
+        raise InputError(
+            f"has {file_size:,} bytes that decode to {size:,}, more than {DECODED_TIMES} times as "
+            "much; unpack it by the tool that wrote it"
+        )
