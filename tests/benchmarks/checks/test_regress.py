@@ -22,7 +22,7 @@ from benchmarks.metrics.table import METRICS
 from parapoint import InputError
 
 
-def golden_row(**values):
+def line(**values):
     return {"status": "ok"} | dict.fromkeys(SOLVERS.metrics, "1") | values
 
 
@@ -48,11 +48,11 @@ def test_what_moved_is_named_with_its_case():
     allowed = dict.fromkeys(SOLVERS.metrics, Tolerance(1e-3, 0, "")) | {
         "chart_count": Tolerance(0, 0, ""),
     }
-    golden = {"spot": golden_row(), "boat": golden_row(), "gone": golden_row()}
-    now = {"spot": golden_row(chart_count="2", resolution="1.0005"), "boat": golden_row(), "new": golden_row()}
+    golden = {"spot": line(), "boat": line(), "gone": line()}
+    now = {"spot": line(chart_count="2", resolution="1.0005"), "boat": line(), "new": line()}
     found = {(move.case, move.metric) for move in moves("lscm", golden, now, allowed)}
     assert found == {("spot", "chart_count"), ("gone", "status"), ("new", "status")}
-    assert moves("lscm", {"a": golden_row(status="ok")}, {"a": golden_row(status="failed")}, allowed)
+    assert moves("lscm", {"a": line(status="ok")}, {"a": line(status="failed")}, allowed)
 
 
 def test_the_table_shows_the_farthest_first():
@@ -73,8 +73,8 @@ def comparison(tmp_path, monkeypatch):
 
 
 def test_golden_files_are_rewritten_in_the_order_of_the_cases(comparison):
-    regress.write_golden("lscm", {"boat": golden_row(), "zebra": golden_row()}, comparison)
-    regress.write_golden("lscm", {"spot": golden_row(resolution="7"), "boat": golden_row()}, comparison)
+    regress.write_golden("lscm", {"boat": line(), "zebra": line()}, comparison)
+    regress.write_golden("lscm", {"spot": line(resolution="7"), "boat": line()}, comparison)
     rows = regress.golden_rows("lscm", comparison)
     assert list(rows) == ["spot", "boat", "zebra"]
     assert rows["spot"] == {"status": "ok", "resolution": "7", "chart_count": "1"}
@@ -125,7 +125,7 @@ def test_known_figures_are_met_or_named():
     now = {row["method"]: {} for row in rows}
     assert regress.missed_figures(rows, now) == []
     for row in rows:
-        now[row["method"]][row["case"]] = golden_row(angle_difference_mean=row["value"])
+        now[row["method"]][row["case"]] = line(angle_difference_mean=row["value"])
     assert regress.missed_figures(rows, now) == []
     now["lscm"]["camelhead"]["angle_difference_mean"] = "0.03"
     assert [(m.case, m.golden) for m in regress.missed_figures(rows, now)] == [
