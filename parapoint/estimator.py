@@ -26,6 +26,7 @@ from parapoint.surfaces.parameterization import (
     TracePoint,
 )
 from parapoint.surfaces.seam_points import seam_points
+from parapoint.surfaces.strays import unmapped, without_strays
 from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, PointCloud, Surface
 
 logger = logging.getLogger("parapoint")
@@ -111,8 +112,9 @@ class Estimator(ABC):
 
         Args:
             points: (N, 3) coordinates, a PointCloud, or a Mesh (its vertices, and points on its
-                faces where those do not show its shape). Rows that are not finite are left out,
-                repeated ones count once; `report_` has the numbers. Units are free.
+                faces where those do not show its shape). Rows that are not finite, or stray
+                (`parapoint.surfaces.strays`), are left out, repeated ones
+                count once; `report_` has the numbers. Units are free.
             y: not used.
             checkpoint: folder where the state of a training is saved each minute. A fit that finds
                 the state of the same run there goes on from it, and removes it at the end.
@@ -132,9 +134,10 @@ class Estimator(ABC):
 
     def _fit(self, points: npt.ArrayLike | Surface, session: Session) -> Self:
         self.check()
-        return self._take(
-            fitting.fitted(self.fit_part, surface_of(points), self.components, session)
-        )
+        surface, strays = without_strays(surface_of(points))
+        fitted = fitting.fitted(self.fit_part, surface, self.components, session)
+        fitted.report.update(strays)
+        return self._take(fitted)
 
     def _take(self, fitted: Fitted) -> Self:
         """Become the estimator of a fitted value."""
@@ -241,7 +244,7 @@ class Estimator(ABC):
         model = dataclasses.replace(self, seed=seed)  # type: ignore[type-var]  # a subclass is a dataclass
         at = coordinates(surface, 3)
         model._fit(surface, Session(watched=at if len(at) <= MOST_WATCHED else None))  # noqa: SLF001 (a copy of this one)
-        uv = model.transform(at)
+        uv = unmapped(surface, model.transform(at))
         if isinstance(surface, Mesh):
             return Parameterization(uv, surface.faces, model.trace_, model.report_)
         return PointParameterization(uv, model.trace_, model.report_)

@@ -59,8 +59,9 @@ def read_as(ending: str, data: bytes) -> None:
 
 def score(data: bytes) -> None:
     """Score `data` as an OBJ file, or as an NPZ file where it is an archive."""
-    from benchmarks.commands.score import map_state, read_point_map
+    from benchmarks.commands.score import map_state
     from benchmarks.metrics import table as metrics
+    from parapoint.files.reading import read_point_map
 
     path = _scratch() / ("map.npz" if data.startswith(b"PK") else "map.obj")
     path.write_bytes(data)
@@ -230,6 +231,7 @@ def _file_seeds() -> dict[str, list[bytes]]:
         ],
         "las": [stream.getvalue()],
         "laz": [stream.getvalue()],
+        "npz": [archive.getvalue()],
         "score": [obj.encode(), archive.getvalue()],
     }
 

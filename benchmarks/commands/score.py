@@ -16,9 +16,9 @@ from benchmarks.metrics import table as metrics
 from benchmarks.metrics.grades import BOUNDS, grade
 from benchmarks.metrics.table import GROUPS, METRICS, WITHOUT_SPANNING, MapState
 from parapoint.errors import InputError
-from parapoint.files.reading import faults_of, read_parameterized
-from parapoint.surfaces.parameterization import Parameterization, PointParameterization
-from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, PointCloud
+from parapoint.files.reading import faults_of, has_faces, read_parameterized, read_point_map
+from parapoint.surfaces.parameterization import Parameterization
+from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 
 WORST = 5
 """Faces listed as the worst, by angle and by area."""
@@ -38,12 +38,12 @@ WIDTH = 160
     "--heatmap", type=click.Path(path_type=Path), metavar="OUT.png", help="Draw the distortion."
 )
 def score(file: Path, *, reference: Path | None, as_json: bool, heatmap: Path | None) -> None:
-    """Grade and metrics of the UV map in FILE: OBJ with vt, GLB, or a cloud's NPZ (points, uv).
+    """Grade and metrics of the UV map in FILE: OBJ with vt, GLB, PLY or NPZ, of a mesh or a cloud.
 
     Polygons are triangulated first; faces are the triangles, numbered from 0 in the file's order.
     JSON has no infinity: an infinite value is the string "inf".
     """
-    if file.suffix.lower() == ".npz":
+    if not has_faces(file):
         if reference is not None or heatmap is not None:
             raise InputError(f"{file}: --reference and --heatmap need a mesh, not a point cloud")
         cloud, image = read_point_map(file)
@@ -103,22 +103,6 @@ def same_faces(mesh: Mesh, other: Mesh) -> bool:
     here, there = mesh.vertices[mesh.faces], other.vertices[other.faces]
     extent = float(np.ptp(here.reshape(-1, 3), axis=0).max())
     return bool((np.abs(here - there) <= SAME_PLACE * extent).all())
-
-
-def read_point_map(file: Path) -> tuple[PointCloud, PointParameterization]:
-    """The points and their images in an .npz file with arrays `points` and `uv`.
-
-    Raises:
-        InputError: the file cannot be read, lacks an array, or an array is not as said.
-    """
-    with faults_of(file):
-        if not file.is_file():
-            raise InputError("no such file")
-        with np.load(file) as arrays:
-            missing = [name for name in ("points", "uv") if name not in arrays]
-            if missing:
-                raise InputError(f"has no array {missing[0]!r}; a point map has points and uv")
-            return PointCloud(arrays["points"]), PointParameterization(arrays["uv"])
 
 
 def json_values(values: dict[str, float]) -> dict[str, float | str]:

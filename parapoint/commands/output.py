@@ -8,13 +8,14 @@ import numpy as np
 
 from parapoint.errors import InputError
 from parapoint.estimator import Estimator
-from parapoint.files.mesh_writers import write_textured
+from parapoint.files.mesh_writers import write_npz, write_ply, write_textured
 from parapoint.files.point_writers import write_points
 from parapoint.files.targets import beside, checked_target
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.sampling import mean_spacing
 from parapoint.surfaces.spanning import Transform, opened, spanning_edges
-from parapoint.surfaces.surface import Mesh, PointCloud, Surface
+from parapoint.surfaces.strays import unmapped
+from parapoint.surfaces.surface import Mesh, Surface
 from parapoint.textures.baking import MARGIN, baked
 from parapoint.textures.checkerboard import checkerboard
 from parapoint.textures.placing import BORDER, Placing
@@ -89,19 +90,21 @@ def write(
     points = surface.vertices if isinstance(surface, Mesh) else surface.points
     facts: dict[str, object] = {"file": out, "mapped_points": len(points)}
     shown, pixels = placing.of(charted), checkerboard()
-    if ending == ".npz" or (ending == ".ply" and texture is None):
-        cloud = surface if isinstance(surface, PointCloud) else PointCloud(points)
-        write_points(out, cloud, _then(model, placing)(points))
-    elif isinstance(surface, Mesh):
+    if isinstance(surface, Mesh):
         transform = _then(model, placing)
         uv = transform(points)
         spans = spanning_edges(surface, uv, transform, mean_spacing(model.points_))
         parameterization = opened(surface, uv, spans)
         facts["spanning_faces"] = int((parameterization.corners != surface.faces).any(1).sum())
         shown = Charted(surface, parameterization)
-        write_textured(out, shown, pixels)
-    elif ending == ".obj" and texture is None:
-        write_points(out, surface, _then(model, placing)(points))
+        if ending == ".npz":
+            write_npz(out, shown)
+        elif ending == ".ply" and texture is None:
+            write_ply(out, shown)
+        else:
+            write_textured(out, shown, pixels)
+    elif ending == ".npz" or (ending in {".ply", ".obj"} and texture is None):
+        write_points(out, surface, unmapped(surface, _then(model, placing)(points)))
     else:
         facts |= {"faces": len(charted.mesh.faces), "texture": size}
         pixels = checkerboard(pixels=max(1, size // 32))

@@ -142,8 +142,23 @@ def write_glb(path: str | Path, charted: Charted, texture: npt.NDArray[np.uint8]
         file.write(data)
 
 
-def write_ply(path: str | Path, charted: Charted, texture: npt.NDArray[np.uint8]) -> None:
-    """Write a textured mesh as PLY: s and t at the vertices, and the texture beside it (.png).
+def write_npz(path: str | Path, charted: Charted) -> None:
+    """Write a mesh and its map as NumPy arrays: vertices, faces, uv and corners.
+
+    Raises:
+        OSError: the file cannot be written; nothing is left behind.
+    """
+    mesh, held = charted
+    with complete_file(Path(path)) as file:
+        np.savez_compressed(
+            file, vertices=mesh.vertices, faces=mesh.faces, uv=held.uv, corners=held.corners
+        )
+
+
+def write_ply(
+    path: str | Path, charted: Charted, texture: npt.NDArray[np.uint8] | None = None
+) -> None:
+    """Write a mesh as PLY: s and t at the vertices, and the texture, if any, beside it (.png).
 
     Blender reads s and t; MeshLab reads the list "texcoord" of each face and the comment that
     names the texture.
@@ -152,22 +167,25 @@ def write_ply(path: str | Path, charted: Charted, texture: npt.NDArray[np.uint8]
         OSError: a file cannot be written; nothing of the PLY is left behind.
     """
     path = Path(path)
-    image = _texture_beside(path, texture)
+    named = []
+    if texture is not None:
+        named = [f"comment TextureFile {_texture_beside(path, texture).name}"]
     split = _Split.of(charted)
     header = [
         "ply",
         "format binary_little_endian 1.0",
-        f"comment TextureFile {image.name}",
+        *named,
         f"element vertex {len(split.points)}",
         *(f"property double {axis}" for axis in "xyz"),
-        *(f"property float {name}" for name in ("nx", "ny", "nz", "s", "t")),
+        *(f"property float {name}" for name in ("nx", "ny", "nz")),
+        *(f"property double {name}" for name in "st"),
         f"element face {len(split.faces)}",
         "property list uchar int vertex_indices",
         "property list uchar float texcoord",
         "end_header\n",
     ]
     vertices = np.zeros(
-        len(split.points), [("at", "<f8", 3), ("normal", "<f4", 3), ("uv", "<f4", 2)]
+        len(split.points), [("at", "<f8", 3), ("normal", "<f4", 3), ("uv", "<f8", 2)]
     )
     vertices["at"], vertices["normal"], vertices["uv"] = split.points, split.normals, split.uv
     lists = [("n", "u1"), ("row", "<i4", 3), ("m", "u1"), ("uv", "<f4", (3, 2))]

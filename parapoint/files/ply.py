@@ -15,8 +15,12 @@ import numpy.typing as npt
 
 from parapoint.errors import InputError
 from parapoint.files.attributes import GEOMETRY, named_attributes
-from parapoint.files.content import Content, floats, integers, ranges, strip_triangles, whole
+from parapoint.files.content import NO_UV, Content, floats, integers, ranges, strip_triangles, whole
 from parapoint.surfaces.surface import FloatArray, IntArray
+
+INDICES = {"vertex_indices", "vertex_index"}
+UV_COLUMNS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texcoord_u", "texcoord_v"))
+"""Names under which the UV of vertices stand."""
 
 PLY_TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -84,15 +88,18 @@ def ply(data: bytes) -> Content:
     at = 0
     columns: dict[str, npt.NDArray[Any]] = {}
     sizes = corners = np.zeros(0, dtype=np.int64)
+    wedges: tuple[IntArray, FloatArray] | None = None
     for name, count, properties in elements:
         if name == "vertex":
             columns, at = _ply_table(body, at, count, properties)
         else:
-            sizes_here, corners_here, at = _ply_lists(body, at, count, properties)
+            begin = at
+            sizes_here, values, at = _ply_lists(body, begin, count, properties, INDICES)
             if name == "face":
-                sizes, corners = sizes_here, corners_here
+                sizes, corners = sizes_here, whole(values)
+                wedges = _ply_lists(body, begin, count, properties, {"texcoord"})[:2]
             elif name == "tristrips":
-                triangles = strip_triangles(sizes_here, corners_here)
+                triangles = strip_triangles(sizes_here, whole(values))
                 sizes, corners = np.full(len(triangles), 3), triangles.reshape(-1)
     if not all(axis in columns for axis in "xyz"):
         raise InputError("has no vertex element with x, y and z")
@@ -100,7 +107,30 @@ def ply(data: bytes) -> Content:
     normals = None
     if all(axis in columns for axis in ("nx", "ny", "nz")):
         normals = _stacked(columns, "nx", "ny", "nz")
-    return Content(vertices, sizes, corners, normals, attributes=named_attributes(columns))
+    uv, uv_corners = _ply_uv(columns, corners, sizes, wedges) if len(sizes) else (None, None)
+    attributes = named_attributes(columns)
+    return Content(vertices, sizes, corners, normals, uv, uv_corners, attributes)
+
+
+def _ply_uv(
+    columns: dict[str, npt.NDArray[Any]],
+    corners: IntArray,
+    sizes: IntArray,
+    wedges: tuple[IntArray, FloatArray] | None,
+) -> tuple[FloatArray | None, IntArray | None]:
+    """UV and their rows at the corners: of the vertices, or of each face's list "texcoord"."""
+    for names in UV_COLUMNS:
+        if all(name in columns for name in names):
+            pair = [columns.pop(name).astype(np.float64) for name in names]
+            return np.stack(pair, axis=1), corners
+    if wedges is None or len(wedges[1]) == 0:
+        return None, None
+    counts, values = wedges
+    if ((counts != 2 * sizes) & (counts != 0)).any():
+        return None, None  # of something else than corners
+    has_uv = np.repeat(counts > 0, sizes)
+    rows = np.where(has_uv, np.cumsum(has_uv) - 1, NO_UV)
+    return values.reshape(-1, 2), rows
 
 
 def _stacked(columns: dict[str, npt.NDArray[Any]], *names: str) -> FloatArray:
@@ -166,19 +196,19 @@ def _ply_table(
 
 
 def _ply_lists(
-    body: _Body, at: int, count: int, properties: list[_Property]
-) -> tuple[IntArray, IntArray, int]:
-    """Lengths and values of an element's vertex index list, and the unit behind the element."""
+    body: _Body, at: int, count: int, properties: list[_Property], names: set[str]
+) -> tuple[IntArray, FloatArray, int]:
+    """Lengths and values of an element's list of these names, and the unit behind the element."""
     none = np.zeros(0, dtype=np.int64)
     if all(item.count_type is None for item in properties):
-        return none, none, at + count * sum(body.width(item.type) for item in properties)
+        return none, np.zeros(0), at + count * sum(body.width(item.type) for item in properties)
     steps: list[tuple[int, int, int, Callable[[int], int] | None, bool]] = []
     index_type = np.dtype("i4")
     for item in properties:
         if item.count_type is None:
             steps.append((body.width(item.type), 0, 0, None, False))
             continue
-        wanted = item.name in {"vertex_indices", "vertex_index"}
+        wanted = item.name in names
         if wanted:
             index_type = item.type
         steps.append(
@@ -210,4 +240,4 @@ def _ply_lists(
     run = integers(sizes)
     width = body.width(index_type)
     places = np.repeat(integers(starts), run) + width * ranges(np.zeros_like(run), run)
-    return run, whole(body.values(places, index_type)), at
+    return run, body.values(places, index_type), at

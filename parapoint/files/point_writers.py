@@ -12,7 +12,8 @@ import numpy.typing as npt
 from parapoint.errors import InputError
 from parapoint.files.attributes import COLOUR_COLUMNS, unit_colours
 from parapoint.files.targets import complete_file
-from parapoint.surfaces.surface import FloatArray, PointCloud, read_only
+from parapoint.surfaces.parameterization import PointParameterization
+from parapoint.surfaces.surface import FloatArray, PointCloud
 
 ROWS_WRITTEN = 65_536
 """Points written at a time, which bounds the memory that their text takes beside them."""
@@ -35,11 +36,14 @@ def write_points(path: str | Path, cloud: PointCloud, uv: FloatArray) -> None:
     as fractions behind each position.
 
     Raises:
-        InputError: another ending; `uv` is not finite or not (P, 2).
+        InputError: another ending; `uv` is not (P, 2), each row finite or of two NaN.
         OSError: the file cannot be written; nothing is left behind.
     """
     path = Path(path)
-    uv = read_only(uv, np.float64, "uv", 2)
+    if not np.isfinite(uv).all():  # stray points have no place
+        uv = PointParameterization(uv).uv
+    elif np.ndim(uv) != 2 or uv.shape[1] != 2:
+        raise InputError(f"{path}: uv must have shape (n, 2), not {np.shape(uv)}")
     if len(uv) != len(cloud.points):
         raise InputError(f"{path}: {len(uv)} uv for {len(cloud.points)} points")
     writers: dict[str, Callable[[IO[bytes], PointCloud, FloatArray], None]] = {

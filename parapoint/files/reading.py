@@ -20,6 +20,7 @@ from parapoint.files.content import NO_UV, Content
 from parapoint.files.decoding import plain
 from parapoint.files.gltf import glb, gltf
 from parapoint.files.las import las
+from parapoint.files.npz import npz
 from parapoint.files.obj import obj
 from parapoint.files.off import off
 from parapoint.files.pcd import pcd
@@ -27,7 +28,7 @@ from parapoint.files.ply import ply
 from parapoint.files.polygons import triangle_rows
 from parapoint.files.stl import stl
 from parapoint.files.xyz import pts, xyz
-from parapoint.surfaces.parameterization import Parameterization
+from parapoint.surfaces.parameterization import Parameterization, PointParameterization
 from parapoint.surfaces.surface import (
     BoolArray,
     FloatArray,
@@ -50,10 +51,11 @@ FORMATS: dict[str, Callable[[bytes, Path], Content]] = {
     ".pcd": lambda data, _: pcd(data),
     ".las": lambda data, _: las(data),
     ".laz": lambda data, _: las(data),
+    ".npz": lambda data, _: npz(data),
 }
 """Reader of each file name ending; it gets the bytes and the folder of the file."""
 
-UV_FORMATS = (".obj", ".glb", ".gltf")
+UV_FORMATS = (".obj", ".ply", ".glb", ".gltf", ".npz")
 
 logger = logging.getLogger("parapoint")
 
@@ -132,6 +134,36 @@ def faults_of(path: Path) -> Iterator[None]:
         raise InputError(f"{path}: is no {kind} file that can be read ({detail})") from error
 
 
+def read_point_map(path: str | Path) -> tuple[PointCloud, PointParameterization]:
+    """The points in a PLY (with u and v) or NPZ file (points, uv), and their map.
+
+    Raises:
+        InputError: as for `read_surface`; the file has faces or no UV; a row of them is neither
+            finite nor of two NaN.
+    """
+    path = Path(path)
+    with faults_of(path):
+        content = _content(path)
+        if len(content.sizes):
+            raise InputError("has faces; it is no point cloud")
+        uv = content.attributes.get("uv")
+        if uv is None and {"u", "v"} <= set(content.attributes):
+            uv = np.stack([content.attributes[name] for name in "uv"], axis=1)
+        if uv is None:
+            raise InputError("has no array 'uv'; a point map has points and uv")
+        return PointCloud(content.vertices), PointParameterization(uv)
+
+
+def has_faces(path: str | Path) -> bool:
+    """Whether a file holds a mesh.
+
+    Raises:
+        InputError: as for `read_surface`.
+    """
+    with faults_of(Path(path)):
+        return len(_content(Path(path)).sizes) > 0
+
+
 def _content(path: Path) -> Content:
     """What the file holds, by the reader of its ending."""
     reader = FORMATS.get(path.suffix.lower())
@@ -143,7 +175,8 @@ def _content(path: Path) -> Content:
         raise InputError(f"has an unknown ending; known are {', '.join(FORMATS)}")
     if not path.is_file():
         raise InputError("is not a regular file")
-    return reader(plain(path.read_bytes()), path.parent)
+    data = path.read_bytes()
+    return reader(data if path.suffix.lower() == ".npz" else plain(data), path.parent)
 
 
 def _mesh(content: Content) -> tuple[Mesh, IntArray]:

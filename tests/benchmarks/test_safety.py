@@ -12,9 +12,9 @@ import pytest
 
 from benchmarks.cases.suites import Suite
 from benchmarks.checks import instant
-from benchmarks.commands.score import read_point_map
 from benchmarks.running.runner import run
 from parapoint.errors import InputError
+from parapoint.files.reading import read_point_map
 
 OFF = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
 NAMES = re.compile(

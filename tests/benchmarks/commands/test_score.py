@@ -200,6 +200,7 @@ def test_wrong_use_gets_one_line(obj, tmp_path, capsys):
     cloud = tmp_path / "cloud.npz"
     cloud.write_bytes(b"PK no zip")
     assert "cloud.npz" in fault(capsys, cloud)
+    np.savez(cloud, points=np.eye(3), uv=np.eye(3)[:, :2])
     assert "need a mesh" in fault(capsys, cloud, "--heatmap", tmp_path / "x.png")
     assert not list(tmp_path.glob("x.*"))
 

@@ -709,7 +709,7 @@ def test_points_are_written_with_their_uv(tmp_path, normals):
     assert_array_equal(read_surface(tmp_path / "a.obj").points, points)
 
 
-@pytest.mark.parametrize("uv", [np.zeros((3, 2)), np.full((4, 2), np.nan)])
+@pytest.mark.parametrize("uv", [np.zeros((3, 2)), np.zeros((4, 3)), np.array([[np.nan, 0]] * 4)])
 def test_points_and_uv_must_agree(tmp_path, uv):
     with pytest.raises(InputError):
         write_points(tmp_path / "a.ply", PointCloud(SQUARE), uv)

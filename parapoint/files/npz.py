@@ -1,0 +1,56 @@
+"""NumPy archives as we write them: bytes in, `Content` out."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+
+import numpy as np
+
+from parapoint.errors import InputError
+from parapoint.files.content import Content, points_content
+from parapoint.files.decoding import check_decoded
+
+
+def npz(data: bytes) -> Content:
+    """Arrays points, normals and whatever else is known; or vertices, faces, uv and corners."""
+    if not data:
+        raise InputError("is empty")
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        check_decoded(sum(item.file_size for item in archive.infolist()), len(data))
+    with np.load(io.BytesIO(data), allow_pickle=False) as file:
+        arrays = {name: np.asarray(file[name]) for name in file.files}
+    if "vertices" in arrays and "faces" in arrays:
+        faces = _whole(arrays, "faces")
+        content = Content(
+            _coordinates(arrays, "vertices"), np.full(len(faces), 3), faces.reshape(-1)
+        )
+        if "uv" in arrays:
+            uv_corners = _whole(arrays, "corners" if "corners" in arrays else "faces")
+            content.uv, content.uv_corners = arrays["uv"], uv_corners.reshape(-1)
+        return content
+    if "points" not in arrays:
+        raise InputError("has no array 'points'; a point map has points and uv")
+    points = _coordinates(arrays, "points")
+    normals = arrays.pop("normals", None)
+    others = {name: of for name, of in arrays.items() if len(np.atleast_1d(of)) == len(points)}
+    if "uv" in arrays and "uv" not in others:
+        raise InputError(f"has {len(np.atleast_1d(arrays['uv']))} uv rows for {len(points)} points")
+    del others["points"]
+    return points_content(points, normals, others)
+
+
+def _coordinates(arrays: dict[str, np.ndarray], name: str) -> np.ndarray:
+    """(n, 3) numbers of an array."""
+    array = arrays[name]
+    if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "fiu":
+        raise InputError(f"{name} must have shape (n, 3), not {array.shape} {array.dtype}")
+    return array.astype(np.float64)
+
+
+def _whole(arrays: dict[str, np.ndarray], name: str) -> np.ndarray:
+    """(n, 3) indices of an array."""
+    array = arrays[name]
+    if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "iu":
+        raise InputError(f"{name} must be whole numbers of shape (n, 3), not {array.shape}")
+    return array.astype(np.int64)

@@ -1,0 +1,96 @@
+"""Stray points: rows of a cloud far from everything else, as flying pixels and no-data rows are."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, PointCloud, Surface
+
+APART = 30.0
+"""Sides of the cells, in typical spacings, through which points hang together. Lines of a scan
+that lie thirty times as far apart as their points still do."""
+NEAREST = 6
+"""The distance to the neighbour of this rank, its median over the points, is the spacing."""
+FEW = 10
+FEW_SHARE = 0.005
+"""A group of points is stray if it has no more points than the larger of this number and share."""
+MOST = 0.1
+"""If a larger share of the points is in such groups, they are how the cloud is sampled."""
+SAMPLED = 5_000
+"""Points whose spacing is looked at."""
+LARGEST = 1e12
+"""Coordinates count as no larger than this, in the median distance from the middle."""
+
+NAMED = 10
+"""Stray rows that are named one by one."""
+
+logger = logging.getLogger("parapoint")
+
+
+def without_strays(surface: Surface) -> tuple[Surface, dict[str, object]]:
+    """The surface without the stray points of a cloud; their number and first rows, as facts.
+
+    A warning names them. Rows are numbered from 0.
+    """
+    if isinstance(surface, Mesh):
+        return surface, {}
+    is_stray = stray_points(surface.points)
+    rows = np.flatnonzero(is_stray)
+    if len(rows) == 0:
+        return surface, {"strays": 0}
+    named = ", ".join(map(str, rows[:NAMED].tolist())) + ", ..." * (len(rows) > NAMED)
+    logger.warning(
+        "%d of %d points lie far from all others and are mapped nowhere: row%s %s",
+        len(rows),
+        len(is_stray),
+        "s" * (len(rows) > 1),
+        named,
+    )
+    kept = ~is_stray
+    normals = None if surface.normals is None else surface.normals[kept]
+    attributes = {name: values[kept] for name, values in surface.attributes.items()}
+    cloud = PointCloud(surface.points[kept], normals, surface.dropped, attributes)
+    return cloud, {"strays": len(rows), "stray_rows": rows[:NAMED].tolist()}
+
+
+def unmapped(surface: Surface, uv: FloatArray) -> FloatArray:
+    """The map (P, 2) of a surface's points with NaN at the stray ones."""
+    if isinstance(surface, Mesh) or not (is_stray := stray_points(surface.points)).any():
+        return uv
+    uv = uv.copy()
+    uv[is_stray] = np.nan
+    return uv
+
+
+def stray_points(points: FloatArray) -> BoolArray:
+    """(P,) whether each of the points (P, 3) is a stray one."""
+    centred = points / 2 - np.median(points, axis=0) / 2  # halves: their difference cannot overflow
+    size = float(np.median(np.abs(centred).max(axis=1))) or float(np.abs(centred).max())
+    if size == 0:
+        return np.zeros(len(points), dtype=bool)
+    with np.errstate(over="ignore"):
+        scaled = np.clip(centred / size, -LARGEST, LARGEST)
+    places, place = np.unique(scaled, axis=0, return_inverse=True)
+    if len(places) <= NEAREST + 1:
+        return np.zeros(len(points), dtype=bool)
+    looked_at = places[:: len(places) // SAMPLED + 1]
+    spacing = float(np.median(cKDTree(places).query(looked_at, NEAREST + 1)[0][:, -1]))
+    cells, cell = np.unique(
+        np.floor(places / (APART * spacing)).astype(np.int64), axis=0, return_inverse=True
+    )
+    pairs = cKDTree(cells.astype(np.float64)).query_pairs(
+        1.8, output_type="ndarray"
+    )  # with corners
+    links = coo_matrix((np.ones(len(pairs), dtype=bool), pairs.T), (len(cells),) * 2)
+    group = connected_components(links, directed=False)[1][cell.reshape(-1)]
+    count = np.bincount(group)
+    is_stray = (count <= max(FEW, FEW_SHARE * len(places))) & (count < count.max())
+    found: BoolArray = is_stray[group][place.reshape(-1)]
+    if found.mean() > MOST:
+        return np.zeros(len(points), dtype=bool)
+    return found

@@ -1,0 +1,74 @@
+"""Stray points: found at any distance, named by row, mapped nowhere; nothing else is."""
+
+import logging
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from parapoint import ComputedMap, PointCloud
+from parapoint.surfaces.strays import stray_points
+from parapoint.surfaces.surface import FloatArray
+
+
+def dome(count: int = 1500) -> FloatArray:
+    """Points of half a unit sphere."""
+    points = np.random.default_rng(0).normal(size=(count, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    points[:, 2] = np.abs(points[:, 2])
+    return points
+
+
+def flying(count: int, radii: float) -> FloatArray:
+    """Points in all directions, 0.3 to 1 times so many radii off."""
+    rng = np.random.default_rng(1)
+    points = rng.normal(size=(count, 3))
+    length = radii * rng.uniform(0.3, 1, (count, 1))
+    return points / np.linalg.norm(points, axis=1, keepdims=True) * length
+
+
+@pytest.mark.parametrize("radii", [30, 500, 1e4, 1e6, 1e100])
+@pytest.mark.parametrize("share", [0.0007, 0.01, 0.05])
+def test_strays_at_any_distance(radii: float, share: float) -> None:
+    """One to five of a hundred, and a single one, whatever the unit and the place."""
+    strays = flying(round(1500 * share), radii)
+    points = np.concatenate([dome(), strays])
+    expected = np.arange(len(points)) >= 1500
+    assert_array_equal(stray_points(points), expected)
+    assert_array_equal(stray_points(1e-6 * points[::-1]), expected[::-1])
+
+
+def test_rows_without_data_are_one_place() -> None:
+    """A scanner's zeros, hundreds of times, far from its map coordinates."""
+    points = np.concatenate([dome() + np.array([5e5, 5e6, 100]), np.zeros((150, 3))])
+    assert_array_equal(stray_points(points), np.arange(1650) >= 1500)
+
+
+@pytest.mark.parametrize("gap", [1, 12, 30])
+def test_scan_lines_are_no_strays(gap: float) -> None:
+    """Nor are components, repeated points, or few points."""
+    x, y = np.meshgrid(np.arange(500.0), gap * np.arange(12.0))
+    lines = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
+    assert not stray_points(lines).any()
+
+
+def test_components_and_small_clouds_are_no_strays() -> None:
+    """A second dome far off; four points; one place."""
+    assert not stray_points(np.concatenate([dome(), dome(400) + np.array([50, 0, 0])])).any()
+    assert not stray_points(1e3 * np.eye(4)[:, :3]).any()
+    assert not stray_points(np.ones((9, 3))).any()
+
+
+def test_a_map_is_as_without_its_strays(caplog: pytest.LogCaptureFixture) -> None:
+    """They are counted, named by row, and NaN in the map."""
+    points = dome(400)
+    with caplog.at_level(logging.WARNING):
+        found = ComputedMap().parameterize(
+            PointCloud(np.concatenate([points, flying(2, 1e6)])), seed=0
+        )
+    assert "2 of 402 points lie far from all others" in caplog.text
+    assert "rows 400, 401" in caplog.text
+    assert found.report["strays"] == 2
+    assert np.isnan(found.uv[400:]).all()
+    alone = ComputedMap().parameterize(PointCloud(points), seed=0)
+    assert_array_equal(found.uv[:400], alone.uv)
