@@ -9,7 +9,6 @@ import igl
 import numpy as np
 from scipy.spatial import cKDTree
 
-from baselines.disks.flattening import FlatteningError
 from baselines.disks.lscm import LSCM
 from baselines.disks.slim import SLIM
 from baselines.tools.meshlab import pymeshlab
@@ -19,6 +18,7 @@ from parapoint.method import UnsupportedError
 from parapoint.surfaces.parameterization import Charted, Parameterization, PointParameterization
 from parapoint.surfaces.preparation import prepared
 from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, PointCloud, Surface
+from parapoint.unwrapping.domains import FlatteningError
 
 FLATTENINGS: dict[str, Xatlas | LSCM | SLIM] = {"xatlas": Xatlas(), "lscm": LSCM(), "slim": SLIM()}
 

@@ -43,7 +43,7 @@ METHODS: dict[str, str] = {
     "meshlab_harmonic": "baselines.tools.meshlab:MeshLabHarmonic",
     "meshlab_voronoi": "baselines.tools.meshlab:MeshLabVoronoi",
     "meshlab_triangles": "baselines.tools.meshlab:MeshLabTriangles",
-    "parapoint+slim": "baselines.hybrid:ParaPointSLIM",
+    "unwrap": "parapoint.unwrapping.unwrap:Unwrap",
     "automatic+slim": "baselines.hybrid:AutomaticSLIM",
     "artist+slim": "baselines.hybrid:ArtistSLIM",
     "meshed": "baselines.meshed:Meshed",
@@ -57,6 +57,9 @@ METHODS: dict[str, str] = {
 
 GROUP = "parapoint.methods"
 """Entry-point group in which an installed package names its methods."""
+
+RENAMED = {"parapoint+slim": "unwrap"}
+"""Names in older results, and the name of today."""
 
 _plugins: dict[str, type[Method]] = {}
 
@@ -290,6 +293,8 @@ def _class(name: str) -> type[Method]:
         return _plugins[name]
     entry = _installed().get(name)
     if entry is None:
+        if name in RENAMED:
+            raise InputError(f"{name} is called {RENAMED[name]} now")
         raise InputError(f"there is no method {name!r}; {_near(name, names())}")
     try:
         module = importlib.import_module(entry.module)

@@ -50,6 +50,7 @@ DISPLAY: dict[str, tuple[str, str]] = {
     "artist+slim": ("Artist's cut + SLIM", ""),
     "automatic+slim": ("Automatic cut + SLIM", ""),
     "parapoint+slim": ("Computed cut + SLIM", ""),
+    "unwrap": ("Unwrap", ""),
     "computed": ("Computed map", ""),
     "parapoint(preset=learned)": ("ParaPoint, our training", ""),
     "parapoint": ("ParaPoint", ""),

@@ -9,7 +9,9 @@ from typing import ClassVar
 import igl
 import numpy as np
 
-from baselines.disks.flattening import (
+from parapoint.surfaces.parameterization import Parameterization, TracePoint
+from parapoint.surfaces.surface import Surface
+from parapoint.unwrapping.domains import (
     check_iterations,
     check_triangles,
     domain,
@@ -19,9 +21,7 @@ from baselines.disks.flattening import (
     signed_areas,
     singular_values,
 )
-from baselines.disks.tutte import tutte
-from parapoint.surfaces.parameterization import Parameterization, TracePoint
-from parapoint.surfaces.surface import Surface
+from parapoint.unwrapping.tutte import tutte
 
 
 @dataclass(frozen=True)

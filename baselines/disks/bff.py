@@ -8,7 +8,9 @@ from typing import ClassVar
 import igl
 import numpy as np
 
-from baselines.disks.flattening import (
+from parapoint.surfaces.parameterization import Parameterization
+from parapoint.surfaces.surface import FloatArray, Surface
+from parapoint.unwrapping.domains import (
     arc_lengths,
     check_triangles,
     closed_holes,
@@ -16,8 +18,6 @@ from baselines.disks.flattening import (
     finite,
     scaled,
 )
-from parapoint.surfaces.parameterization import Parameterization
-from parapoint.surfaces.surface import FloatArray, Surface
 
 
 @dataclass(frozen=True)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
 from typing import ClassVar, Literal
 
-import igl
 import numpy as np
 
-from baselines.disks.flattening import (
+from parapoint.errors import InputError
+from parapoint.surfaces.parameterization import Parameterization, TracePoint
+from parapoint.surfaces.surface import FloatArray, IntArray, Surface
+from parapoint.unwrapping.domains import (
     Domain,
     FlatteningError,
     check_iterations,
@@ -21,25 +22,8 @@ from baselines.disks.flattening import (
     signed_areas,
     singular_values,
 )
-from baselines.disks.tutte import tutte
-from parapoint.computed.bijection import LARGE
-from parapoint.errors import InputError
-from parapoint.surfaces.parameterization import Parameterization, TracePoint
-from parapoint.surfaces.surface import FloatArray, IntArray, Surface
-
-Density = Callable[[FloatArray, FloatArray], FloatArray]
-
-DENSITIES: dict[str, tuple[Density, float]] = {
-    "symmetric_dirichlet": (lambda s1, s2: s1**2 + s1**-2 + s2**2 + s2**-2, 4.0),
-    "conformal": (lambda s1, s2: (s1 / s2 + s2 / s1) / 2, 1.0),
-    "log_arap": (lambda s1, s2: np.log(s1) ** 2 + np.log(s2) ** 2, 0.0),
-    "exp_conformal": (lambda s1, s2: (s1 / s2 + s2 / s1) / 2, 1.0),
-}
-"""Energy of a triangle by its singular values (table 1 of the paper), and the least value.
-
-The energy of a map is the area-weighted mean; for `exp_conformal` the logarithm of the mean of
-exp(density), which would overflow at a far start.
-"""
+from parapoint.unwrapping.energies import DENSITIES, stepper
+from parapoint.unwrapping.tutte import tutte
 
 NUDGE = 1e-5
 """Corners move so far for a difference quotient of the energy, in typical edges."""
@@ -140,38 +124,6 @@ class SLIM:
         return Parameterization(uv, disk.faces, tuple(trace), report)
 
 
-def stepper(
-    disk: Domain,
-    uv: FloatArray,
-    energy: str,
-    held: IntArray | None = None,
-    weight: float = 0.0,
-) -> Callable[[int], FloatArray]:
-    """A function that takes so many more of libigl's steps and gives the map (V, 2).
-
-    The unit of the surface makes no difference: see `parapoint.computed.bijection.LARGE`.
-
-    Args:
-        disk: the surface.
-        uv: (V, 2) where it starts, without flips.
-        energy: key of DENSITIES.
-        held: (n,) vertices that are drawn to where they start.
-        weight: of that pull.
-    """
-    fixed = np.zeros(0, dtype=np.int64) if held is None else held
-    scale = LARGE / disk.area**0.5
-    state = igl.slim_precompute(
-        np.asfortranarray(scale * disk.vertices),
-        np.asfortranarray(disk.faces.astype(np.int32)),
-        np.asfortranarray(scale * uv),
-        igl.MappingEnergyType.__members__[energy.upper()],
-        fixed.astype(np.int32),
-        np.asfortranarray(scale * uv[fixed]),
-        weight,
-    )
-    return lambda steps: np.ascontiguousarray(igl.slim_solve(state, steps) / scale)
-
-
 def is_minimum(
     name: str, weight: FloatArray, frame: FloatArray, uv: FloatArray, faces: IntArray
 ) -> bool:
@@ -180,7 +132,7 @@ def is_minimum(
     Args:
         name: key of DENSITIES.
         weight: (F,) share of each triangle in the 3D area.
-        frame: (F, 2, 2) the triangles in 3D, as `baselines.disks.flattening.frames` gives them.
+        frame: (F, 2, 2) the triangles in 3D, as `parapoint.unwrapping.domains.frames` gives them.
         uv: (V, 2) the map.
         faces: (F, 3) rows of `uv`.
     """

@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-import igl
-import numpy as np
-from scipy import sparse
-
-from baselines.disks.flattening import Domain, circle, closed_holes, domain, scaled, signed_areas
 from parapoint.surfaces.parameterization import Parameterization
-from parapoint.surfaces.surface import FloatArray, IntArray, Surface
+from parapoint.surfaces.surface import Surface
+from parapoint.unwrapping.domains import domain, signed_areas
+from parapoint.unwrapping.tutte import tutte
 
 
 @dataclass(frozen=True)
@@ -39,29 +36,3 @@ class Tutte:
         areas = signed_areas(uv, disk.faces)
         flips = {"flipped": int((areas < 0).sum()), "degenerate": int((areas == 0).sum())}
         return Parameterization(uv, disk.faces, report=flips)
-
-
-def tutte(disk: Domain) -> FloatArray:
-    """(V, 2) Tutte's embedding of a domain, scaled to its 3D area."""
-    uv = scaled(disk, _embedded(disk, disk.vertices, disk.faces))
-    if (signed_areas(uv, disk.faces) > 0).all():
-        return uv
-    vertices, faces = closed_holes(disk)
-    if len(vertices) == len(disk.vertices):
-        return uv
-    return scaled(disk, _embedded(disk, vertices, faces)[: len(disk.vertices)])
-
-
-def _embedded(disk: Domain, vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """(V, 2) each vertex at the mean of its neighbours, the domain's loop on the unit circle."""
-    adjacency = igl.adjacency_matrix(faces).astype(np.float64)
-    laplacian = sparse.diags(adjacency.sum(axis=1).A1) - adjacency
-    return np.asarray(
-        igl.min_quad_with_fixed(
-            laplacian.tocsc(),
-            np.zeros((len(vertices), 2)),
-            disk.loop,
-            circle(disk.vertices[disk.loop]),
-        ),
-        dtype=np.float64,
-    )

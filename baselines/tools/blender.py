@@ -13,11 +13,11 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from baselines.disks.flattening import FlatteningError, check_iterations, domain, scaled
 from baselines.tools.atlas import joined_corners
 from parapoint.method import MissingError, UnsupportedError
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, Surface
+from parapoint.unwrapping.domains import FlatteningError, check_iterations, domain, scaled
 
 INTERPRETER = "PARAPOINT_BLENDER"
 """Environment variable that names a Python interpreter which can import bpy."""

@@ -12,12 +12,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from baselines.disks.flattening import FlatteningError
 from parapoint.errors import InputError
 from parapoint.files.reading import read_parameterized
 from parapoint.method import MissingError, UnsupportedError
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh, Surface
+from parapoint.unwrapping.domains import FlatteningError
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from baselines.disks.flattening import FlatteningError
 from baselines.tools.atlas import joined_corners
 from baselines.tools.optional import optional
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh, Surface
+from parapoint.unwrapping.domains import FlatteningError
 
 
 @cache

@@ -7,12 +7,12 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from baselines.disks.flattening import FlatteningError
 from baselines.tools.atlas import atlas
 from baselines.tools.optional import optional
 from parapoint.method import UnsupportedError
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh, Surface
+from parapoint.unwrapping.domains import FlatteningError
 
 uvunwrap = optional("uvunwrap", "pip install uvunwrap")
 

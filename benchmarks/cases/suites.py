@@ -44,8 +44,8 @@ COMPUTED = "computed(time_budget=120)"
 # Neural maps of other authors under the budget of PAPER: seconds, points of a step.
 EQUAL = "points=4096, subset=256, time_budget=150"
 
-HYBRID = "parapoint+slim(time_budget=120)"
-LEARNED_SEAM = "parapoint+slim(time_budget=120, price=None)"
+HYBRID = "unwrap(time_budget=120)"
+LEARNED_SEAM = "unwrap(time_budget=120, price=None)"
 
 # What a user with a scan would do instead: every reconstruction with every flattening.
 MESHED_METHODS = tuple(

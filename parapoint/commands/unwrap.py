@@ -9,7 +9,10 @@ import click
 
 from parapoint.commands.fitting import estimator_of, fitted, summary
 from parapoint.commands.output import TEXTURE, preview_target, target, write
-from parapoint.files.reading import read_surface
+from parapoint.errors import InputError
+from parapoint.files.reading import Polygons, read_polygons
+from parapoint.fitting import COMPONENTS
+from parapoint.parameters import check_choice
 from parapoint.surfaces.components import components
 from parapoint.textures.baking import check_size
 
@@ -24,6 +27,10 @@ from parapoint.textures.baking import check_size
     show_default=True,
     help="One map of all, or of each or the largest component.",
 )
+@click.option("--seam-price", type=float, metavar="P", help="Energy a branch must gain a length.")
+@click.option("--max-distortion", type=float, metavar="E", help="Cut on until the energy is E.")
+@click.option("--seams", metavar="FILE", help="Cut along these edges: two vertex numbers a line.")
+@click.option("--per-vertex", is_flag=True, help="One uv for each vertex, whatever the seams.")
 @click.option("--texture", type=int, metavar="N", help="Texels along a side of a texture.")
 @click.option("--margin", type=int, metavar="TEXELS", help="Free texels around the map.")
 @click.option("--preview", metavar="FILE", help="FILE.png: the surface beside its layout.")
@@ -39,13 +46,20 @@ def unwrap(
     preview: str | None,
     force: bool,
     as_json: bool,
+    seams: str | None,
+    per_vertex: bool,
+    seam_price: float | None,
+    max_distortion: float | None,
     **settings: Any,
 ) -> None:
     """Compute the map of a mesh or a point cloud and write it, in the unit square.
 
-    A mesh written as OBJ gets a checkerboard and is cut along the seams of the map: a face whose
-    corners lie on both sides of one keeps its true shape, at the side of its one short edge. With
-    --components largest only that one is written.
+    A mesh is cut along a clean path of its edges and laid out without flips or overlaps. An OBJ
+    file written as OBJ keeps all its lines but for the UVs; without materials of its own it gets a
+    checkerboard. Components are mapped one by one; with --components largest only that one is
+    written. Branches of the seam grow where each lowers the energy (symmetric Dirichlet, 4 at
+    least) by --seam-price (0.1) for a length of the square root of the area; --max-distortion adds
+    to them until the energy is as low, within --time-budget.
 
     Of a cloud FILE.glb is a mesh of it, with its colours baked into a texture (a checkerboard where
     it has none); so are .obj and .ply with --texture. Without they are its points and their UVs.
@@ -53,9 +67,36 @@ def unwrap(
     out = target(out, surface, force=force, textured=texture is not None)
     check_size(TEXTURE if texture is None else texture, margin or 0)
     picture = None if preview is None else preview_target(preview, out, surface, force=force)
-    given = read_surface(surface)
+    given = read_polygons(surface)
+    if isinstance(given, Polygons):
+        from parapoint.commands.unwrapping import Request, border_of, lines, unwrap_mesh
+        from parapoint.unwrapping.unwrap import Unwrap
+
+        check_choice("components", settings["components"], COMPONENTS)
+        request = Request(
+            surface,
+            out,
+            texture or TEXTURE,
+            border_of(margin, texture or TEXTURE),
+            Unwrap(
+                time_budget=settings["time_budget"],
+                price=Unwrap.price if seam_price is None else seam_price,
+                max_distortion=max_distortion,
+            ),
+            settings["seed"],
+            seams,
+            settings["components"] == "largest",
+            per_vertex,
+            picture,
+        )
+        facts = unwrap_mesh(given, request)
+        print(json.dumps(facts) if as_json else lines(facts))
+        return
+    unused = {"--seams": seams, "--seam-price": seam_price, "--max-distortion": max_distortion}
+    for option, value in {**unused, "--per-vertex": per_vertex or None}.items():
+        if value is not None:
+            raise InputError(f"{option} is for meshes; {surface} is a point cloud")
     model = fitted(surface, given, estimator_of("computed", settings))
-    if model.components == "largest":
-        given = components(given)[0]
-    facts = write(model, given, out, texture=texture, margin=margin, preview=picture)
+    written = components(given)[0] if model.components == "largest" else given
+    facts = write(model, written, out, texture=texture, margin=margin, preview=picture)
     print(json.dumps({**facts, **model.report_}) if as_json else f"{out}: {summary(model)}")

@@ -42,10 +42,7 @@ def write_obj(
         )
     material = ""
     if texture is not None:
-        image, library = _texture_beside(path, texture), beside(path, ".mtl")
-        with complete_file(library) as file:
-            file.write(sealed_text(f"newmtl map\nKd 1 1 1\nmap_Kd {image.name}\n"))
-        material = f"mtllib {library.name}\nusemtl map\n"
+        material = write_material(path, texture)
     corners = np.stack([mesh.faces, parameterization.corners], axis=2).reshape(-1, 6) + 1
     lines = [
         material,
@@ -55,6 +52,14 @@ def write_obj(
     ]
     with complete_file(path) as file:
         file.write("".join(lines).encode())
+
+
+def write_material(path: Path, texture: npt.NDArray[np.uint8]) -> str:
+    """Write a texture (.png) and its material (.mtl) beside an OBJ file; the lines that use it."""
+    image, library = _texture_beside(path, texture), beside(path, ".mtl")
+    with complete_file(library) as file:
+        file.write(sealed_text(f"newmtl map\nKd 1 1 1\nmap_Kd {image.name}\n"))
+    return f"mtllib {library.name}\nusemtl map\n"
 
 
 def write_textured(path: str | Path, charted: Charted, texture: npt.NDArray[np.uint8]) -> None:

@@ -12,6 +12,7 @@ import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -76,6 +77,41 @@ def read_surface(path: str | Path) -> Surface:
     with faults_of(path):
         content = _content(path)
         return _mesh(content)[0] if len(content.sizes) else _point_cloud(content, path)
+
+
+class Polygons(NamedTuple):
+    """A mesh and the polygons that it was read from.
+
+    Attributes:
+        mesh: its triangles.
+        places: (F, 3) for each corner of the triangles, its place among the polygons' corners.
+        extras: what else the file holds, in words: what a writer of the mesh alone leaves out.
+    """
+
+    mesh: Mesh
+    places: IntArray
+    extras: tuple[str, ...]
+
+
+def read_polygons(path: str | Path) -> Polygons | PointCloud:
+    """The mesh in a file with its polygons, or the cloud where the file has no faces.
+
+    Raises:
+        InputError: as for `read_surface`.
+    """
+    path = Path(path)
+    with faults_of(path):
+        content = _content(path)
+        if not len(content.sizes):
+            return _point_cloud(content, path)
+        mesh, places = _mesh(content)
+        extras = [
+            "normals" if content.normals is not None else "",
+            "old UVs" if content.uv is not None else "",
+            "polygons" if (content.sizes > 3).any() else "",
+            *content.attributes,
+        ]
+        return Polygons(mesh, places, tuple(name for name in extras if name))
 
 
 def read_parameterized(path: str | Path) -> tuple[Mesh, Parameterization]:

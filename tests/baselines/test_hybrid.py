@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from baselines import hybrid, registry
-from baselines.disks.bijection import crossing_vertices
-from baselines.disks.flattening import signed_areas
+from baselines import registry
 from benchmarks.cases import builtin
 from benchmarks.metrics.table import evaluate
+from parapoint.computed.computed_map import ComputedMap
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
 from parapoint.surfaces.cutting import cut_along, cut_to_disk, disk_cut, edge_lengths
@@ -17,8 +16,10 @@ from parapoint.surfaces.preparation import prepared
 from parapoint.surfaces.spanning import learned_seam, unfolded
 from parapoint.surfaces.surface import Mesh
 from parapoint.testing import irregular_disk, sphere
-
-pytest.importorskip("shapely")
+from parapoint.unwrapping.crossing import crossing_vertices
+from parapoint.unwrapping.descent import Run
+from parapoint.unwrapping.domains import signed_areas
+from parapoint.unwrapping.growth import grow
 
 
 def torn(mesh, cut):
@@ -112,7 +113,7 @@ def test_slim_with_held_vertices_stays_one_to_one_where_free_steps_do_not():
     mesh = slit_ruffle()
     free = registry.method("slim")[1].parameterize(mesh, seed=0)
     assert len(crossing_vertices(mesh, free.uv)) > 0
-    run = hybrid._Run(mesh)
+    run = Run(mesh)
     run.begin(None)
     run.improve(20)
     assert run.held_steps > 0
@@ -134,9 +135,7 @@ def slit_ruffle(rings=8):
 
 def test_the_hybrid_on_a_torus_is_one_to_one_and_better_than_the_automatic_cut():
     mesh = builtin.torus(20)
-    result = registry.method("parapoint+slim(points=600, iterations=10)")[1].parameterize(
-        mesh, seed=0
-    )
+    result = registry.method("unwrap(points=600, iterations=10)")[1].parameterize(mesh, seed=0)
     found = evaluate(mesh, result)
     assert result.report["bijective"]
     assert found["flipped_fraction"] == 0
@@ -169,10 +168,10 @@ def test_a_branch_must_pay():
     cap = builtin.sphere_cap(150, rings=10)
     energies = []
     for price in (1e9, 0.05):
-        run = hybrid._Run(cap)
+        run = Run(cap)
         run.begin(None)
         run.improve(10)
-        run.lengthen(price)
+        grow(run, price)
         energies.append(run.energy)
         assert (run.branches > 0) == (price < 1)
         assert len(crossing_vertices(run.mesh, run.uv)) == 0
@@ -183,10 +182,10 @@ def test_the_price_of_a_seam_is_the_same_at_every_scale():
     cap = builtin.sphere_cap(150, rings=5)
     grown = []
     for scale in (1, 2.0**10):  # exact: the two runs differ by nothing but the unit
-        run = hybrid._Run(Mesh(scale * cap.vertices, cap.faces))
+        run = Run(Mesh(scale * cap.vertices, cap.faces))
         run.begin(None)
         run.improve(3)
-        run.lengthen(0.05)
+        grow(run, 0.05)
         grown.append((run.branches, run.energy))
     assert grown[0][0] > 0
     assert grown[1] == pytest.approx(grown[0], rel=1e-3)
@@ -223,18 +222,18 @@ def test_parapoint_is_asked_only_where_a_cut_could_pay(monkeypatch):
         asked.append(self.points)
         raise InterruptedError
 
-    monkeypatch.setattr(hybrid.ComputedMap, "parameterize", stop)
+    monkeypatch.setattr(ComputedMap, "parameterize", stop)
     bent, cap = irregular_disk(), builtin.sphere_cap(150, rings=5)
     flat = Mesh(bent.vertices * [1, 1, 0], bent.faces)
-    made = registry.method("parapoint+slim")[1].parameterize(flat, seed=0)
+    made = registry.method("unwrap")[1].parameterize(flat, seed=0)
     assert made.report["learned_seam_edges"] == 0
     assert_allclose(made.report["end_energy"], 4, atol=1e-4)
     assert not asked
     for spec, mesh in (
-        ("parapoint+slim", cap),
-        ("parapoint+slim(price=None)", flat),  # the learned seam, whatever it costs
-        ("parapoint+slim(points=150)", cap),
-        ("parapoint+slim", builtin.sphere_cap(150, rings=30)),
+        ("unwrap", cap),
+        ("unwrap(price=None)", flat),  # the learned seam, whatever it costs
+        ("unwrap(points=150)", cap),
+        ("unwrap", builtin.sphere_cap(150, rings=30)),
     ):
         with pytest.raises(InterruptedError):
             registry.method(spec)[1].parameterize(mesh, seed=0)
@@ -246,7 +245,7 @@ def test_what_is_refused():
     artist = registry.method("artist+slim")[1]
     with pytest.raises(UnsupportedError, match="needs a mesh that came with a UV map"):
         prepared(irregular_disk(), artist.requires)
-    with pytest.raises(InputError, match="price must be at least 0 or None, not -1"):
-        registry.method("parapoint+slim(price=-1)")
+    with pytest.raises(InputError, match="price must be a number of at least 0, not -1"):
+        registry.method("unwrap(price=-1)")
     with pytest.raises(InputError, match="iterations must be at least 1"):
-        registry.method("parapoint+slim(iterations=0)")
+        registry.method("unwrap(iterations=0)")

@@ -5,14 +5,14 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from baselines import registry
-from baselines.disks.flattening import FlatteningError
 from baselines.meshed import carried
-from baselines.packing import by_component
 from parapoint.method import UnsupportedError
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.preparation import prepared
 from parapoint.surfaces.surface import Mesh, PointCloud
 from parapoint.testing import irregular_disk
+from parapoint.unwrapping.domains import FlatteningError
+from parapoint.unwrapping.packing import by_component
 
 
 def half_cylinder(count=1000):

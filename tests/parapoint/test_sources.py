@@ -60,8 +60,8 @@ DEPENDENCIES = {
     "benchmarks/metrics/overlap.py": "benchmarks.metrics.table",
     "parapoint/files/pcd.py": "parapoint.files.reading",
     "parapoint/learned/losses.py": "parapoint.learned.parapoint",
-    "parapoint/computed/scale.py": "baselines.hybrid",
-    "baselines/disks/tutte.py": "baselines.disks.slim",
+    "parapoint/computed/scale.py": "parapoint.unwrapping.unwrap",
+    "parapoint/unwrapping/tutte.py": "baselines.disks.slim",
     "reports/pictures/render.py": "reports.pictures.drawing",
 }
 """Files, and a module that depends on each."""

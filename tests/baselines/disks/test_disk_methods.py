@@ -5,7 +5,13 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from baselines import registry
-from baselines.disks.flattening import (
+from baselines.disks.slim import DENSITIES, SLIM, map_energy
+from baselines.disks.tutte import Tutte, tutte
+from parapoint.errors import InputError
+from parapoint.method import UnsupportedError
+from parapoint.surfaces.surface import Mesh, PointCloud
+from parapoint.testing import irregular_disk, sample_surfaces, sphere
+from parapoint.unwrapping.domains import (
     Domain,
     FlatteningError,
     domain,
@@ -14,12 +20,6 @@ from baselines.disks.flattening import (
     signed_areas,
     singular_values,
 )
-from baselines.disks.slim import DENSITIES, SLIM, map_energy
-from baselines.disks.tutte import Tutte, tutte
-from parapoint.errors import InputError
-from parapoint.method import UnsupportedError
-from parapoint.surfaces.surface import Mesh, PointCloud
-from parapoint.testing import irregular_disk, sample_surfaces, sphere
 
 DISK_METHODS = [
     "tutte",

@@ -7,7 +7,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from baselines import registry
-from baselines.disks.flattening import FlatteningError, signed_areas
 from baselines.tools.atlas import atlas, first_rows, joined_corners, row_numbers
 from baselines.tools.meshlab import matched_faces
 from baselines.tools.optional import Missing, optional
@@ -15,6 +14,7 @@ from parapoint.errors import InputError
 from parapoint.method import MissingError
 from parapoint.surfaces.surface import Mesh
 from parapoint.testing import irregular_disk, sphere
+from parapoint.unwrapping.domains import FlatteningError, signed_areas
 
 
 def mapped(spec, mesh):

@@ -10,12 +10,12 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from baselines import registry
-from baselines.disks.flattening import FlatteningError
 from baselines.tools import blender
 from parapoint.errors import InputError
 from parapoint.method import MissingError, UnsupportedError
 from parapoint.surfaces.surface import Mesh
 from parapoint.testing import irregular_disk, sphere
+from parapoint.unwrapping.domains import FlatteningError
 
 DISK_METHODS = ("blender_angle_based", "blender_conformal", "blender_minimum_stretch")
 METHODS = (*DISK_METHODS, "blender_smart_project")

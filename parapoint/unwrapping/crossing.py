@@ -1,13 +1,11 @@
-"""Whether a map of a planar domain without flips is one to one, and SLIM that keeps it so."""
+"""Whether a map of a planar domain without flips is one to one."""
 
 from __future__ import annotations
 
 import numpy as np
+import shapely
 
-from baselines.tools.optional import optional
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
-
-shapely = optional("shapely", "pip install shapely")
 
 
 def crossing_vertices(disk: Mesh, uv: FloatArray) -> IntArray:
@@ -20,9 +18,6 @@ def crossing_vertices(disk: Mesh, uv: FloatArray) -> IntArray:
     Args:
         disk: a planar domain.
         uv: (V, 2) a map of it without flips.
-
-    Raises:
-        UnsupportedError: shapely is not installed.
     """
     start = np.concatenate(disk.boundary_loops)
     end = np.concatenate([np.roll(loop, -1) for loop in disk.boundary_loops])

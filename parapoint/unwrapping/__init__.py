@@ -1,0 +1,1 @@
+"""Unwrap a mesh: seams along its edges, and a map that is one to one."""

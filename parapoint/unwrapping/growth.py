@@ -1,0 +1,85 @@
+"""Growth of a seam to where its map is most distorted, as long as that pays."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import csgraph
+
+from parapoint.surfaces.cutting import cut_along, edge_graph, edge_lengths, path_to
+from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
+from parapoint.unwrapping.descent import LEAST_ENERGY, Run
+
+TRIAL_STEPS = 5
+"""Steps of SLIM after which a longer seam is judged."""
+TRIALS = 3
+"""The seam is as long as it should be once so many trials in a row do not pay."""
+MOST_BRANCHES = 10
+"""The seam grows by so many branches at most where each must pay."""
+MOST_TO_BOUND = 40
+"""The seam grows by so many branches at most on the way to a bound of the energy."""
+
+
+def grow(run: Run, price: float) -> None:
+    """Lead the seam to where the map is most distorted (X. Gu et al. 2002), while that pays.
+
+    Args:
+        run: the map, which is changed.
+        price: what the energy must fall by for each sqrt(area) of seam.
+    """
+    _grow(run, price, LEAST_ENERGY, MOST_BRANCHES)
+
+
+def grow_to(run: Run, energy: float) -> None:
+    """Lead the seam to where the map is most distorted until the energy is at most `energy`.
+
+    It may not get there: a branch that brings nothing is not kept.
+    """
+    _grow(run, 0.0, energy, MOST_TO_BOUND)
+
+
+def _grow(run: Run, price: float, bound: float, most: int) -> None:
+    failed, branches = 0, 0
+    blocked: BoolArray = np.zeros(len(run.mesh.vertices), dtype=bool)
+    while failed < TRIALS and branches < most and run.energy > bound and not run.is_late:
+        lengths = edge_lengths(run.mesh)
+        graph = edge_graph(run.mesh, lengths)
+        distance, previous, _ = csgraph.dijkstra(
+            graph,
+            indices=np.concatenate(run.mesh.boundary_loops),
+            return_predecessors=True,
+            min_only=True,
+        )
+        tip = int(np.where(blocked, -1.0, _excess(run) * distance).argmax())
+        if blocked[tip] or distance[tip] == 0:
+            return
+        path = np.array(path_to(previous, tip))
+        before = run.mesh, run.uv
+        after = cut_along(run.mesh, np.stack([path[:-1], path[1:]], axis=1))
+        run.set(after, run.uv[origin(run.mesh, after)])
+        uv = run.one_to_one(TRIAL_STEPS)
+        least = price * float(distance[tip]) / run.unit
+        if uv is not None and run.energy - run.energy_of(uv) > least:
+            run.uv, run.energy = uv, run.energy_of(uv)
+            run.branches += 1
+            branches += 1
+            failed, blocked = 0, np.zeros(len(run.mesh.vertices), dtype=bool)
+        else:
+            run.set(*before)
+            failed += 1
+            around = csgraph.dijkstra(graph, indices=tip, limit=float(distance[tip]) / 2)
+            blocked |= np.isfinite(around)
+
+
+def _excess(run: Run) -> FloatArray:
+    """(V,) mean energy above the least of the faces around each vertex, by area."""
+    weight = np.repeat(run.mesh.face_areas, 3)
+    rows = run.mesh.faces.reshape(-1)
+    excess = np.repeat(run.densities(run.uv) - LEAST_ENERGY, 3)
+    return np.asarray(np.bincount(rows, weight * excess) / np.bincount(rows, weight))
+
+
+def origin(mesh: Mesh, cut: Mesh) -> IntArray:
+    """(V',) the vertex of `mesh` that each one of `cut`, the same mesh cut open, is or copies."""
+    rows = np.empty(len(cut.vertices), dtype=np.int64)
+    rows[cut.faces] = mesh.faces
+    return rows

@@ -1,0 +1,138 @@
+"""What a person wants to know of a map: angles, stretch, starved parts, seam, texels."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from parapoint.surfaces.parameterization import Charted
+from parapoint.surfaces.surface import BoolArray, FloatArray, flat_faces, twin_halfedges
+
+STARVED = 0.25
+"""A face is starved where its share of the UV area is below this part of its share in space."""
+LEAST_PART = 0.01
+"""Share of the surface that a starved part must hold to be looked at by itself."""
+MOST_STARVED = 0.02
+"""Share of the surface that may be starved before a warning is due."""
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Numbers of one map in the unit square.
+
+    Attributes:
+        angle_mean: mean difference of a corner's angle in space and in the plane, in degrees.
+        angle_worst: the largest, in degrees.
+        stretch_mean: mean over the surface of the larger of s1 and 1 / s2, the singular values of
+            a triangle's map at the mean scale; 1 where nothing is stretched or shrunk.
+        stretch_worst: the largest.
+        smallest_part: least mean area ratio of a starved part of 1 % of the surface; 1 for none.
+        starved: share of the surface with an area ratio below STARVED.
+        flipped: faces that are turned over.
+        charts: pieces of the map.
+        seam: length of the cut over sqrt(area).
+        filled: share of the unit square that the map fills.
+        texels_per_unit: of a texture, along a length of 1 of the mesh, at the mean scale.
+    """
+
+    angle_mean: float
+    angle_worst: float
+    stretch_mean: float
+    stretch_worst: float
+    smallest_part: float
+    starved: float
+    flipped: int
+    charts: int
+    seam: float
+    filled: float
+    texels_per_unit: float
+
+    def facts(self) -> dict[str, object]:
+        """The numbers by name, four digits each."""
+        return {
+            name: float(f"{value:.4g}") if isinstance(value, float) else value
+            for name, value in asdict(self).items()
+        }
+
+
+def quality(placed: Charted, texture: int) -> Quality:
+    """The quality of a map in the unit square.
+
+    Args:
+        placed: the mesh and its map; faces without area take no part but in the charts.
+        texture: texels along a side of the square.
+    """
+    mesh, held = placed
+    solid = ~flat_faces(mesh.vertices, mesh.faces)
+    space = mesh.vertices[mesh.faces[solid]]
+    plane = np.pad(held.uv[held.corners[solid]], ((0, 0), (0, 0), (0, 1)))
+    area, signed = _normals(space), _normals(plane)[:, 2] / 2
+    area = np.linalg.norm(area, axis=1) / 2
+    ratio = (np.abs(signed) / np.abs(signed).sum()) / (area / area.sum())
+    share = area / area.sum()
+    angles = np.abs(_angles(plane) - _angles(space))
+    stretch = _stretch(space, plane, float(np.sqrt(area.sum() / np.abs(signed).sum())))
+    starved: BoolArray = np.zeros(len(mesh.faces), dtype=bool)
+    starved[solid] = ratio < STARVED
+    ends = mesh.vertices[held.seams(mesh)]
+    cut = float(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum())
+    whole = np.zeros((2, len(mesh.faces)))
+    whole[:, solid] = share, ratio * share
+    return Quality(
+        angle_mean=float(share @ angles.mean(axis=1)),
+        angle_worst=float(angles.max()),
+        stretch_mean=float(share @ stretch),
+        stretch_worst=float(stretch.max()),
+        smallest_part=_smallest_part(placed, starved, *whole),
+        starved=float(share[ratio < STARVED].sum()),
+        flipped=int((signed <= 0).sum()),
+        charts=int(held.charts().max()) + 1,
+        seam=cut / float(np.sqrt(area.sum())),
+        filled=float(np.abs(signed).sum()),
+        texels_per_unit=texture * float(np.sqrt(np.abs(signed).sum() / area.sum())),
+    )
+
+
+def _normals(triangles: FloatArray) -> FloatArray:
+    """(F, 3) normals of triangles (F, 3, 3), as long as twice their area."""
+    first, second = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    return np.asarray(np.cross(first, second))
+
+
+def _angles(triangles: FloatArray) -> FloatArray:
+    """(F, 3) angles at the corners of triangles (F, 3, 3), in degrees."""
+    ahead = np.roll(triangles, -1, axis=1) - triangles
+    back = np.roll(triangles, 1, axis=1) - triangles
+    across = np.linalg.norm(np.cross(ahead, back), axis=2)
+    return np.asarray(np.degrees(np.arctan2(across, (ahead * back).sum(axis=2))))
+
+
+def _stretch(space: FloatArray, plane: FloatArray, scale: float) -> FloatArray:
+    """(F,) the larger of s1 and 1 / s2 of each triangle, the plane scaled by `scale`."""
+    first, second = space[:, 1] - space[:, 0], space[:, 2] - space[:, 0]
+    length = np.linalg.norm(first, axis=1)
+    along = (first * second).sum(axis=1) / length
+    height = np.linalg.norm(np.cross(first, second), axis=1) / length
+    u = scale * (plane[:, 1] - plane[:, 0])[:, :2] / length[:, None]
+    v = (scale * (plane[:, 2] - plane[:, 0])[:, :2] - along[:, None] * u) / height[:, None]
+    (a, c), (b, d) = u.T, v.T
+    turn, shear = np.hypot(a + d, c - b) / 2, np.hypot(a - d, c + b) / 2
+    return np.asarray(np.maximum(turn + shear, 1 / np.maximum(np.abs(turn - shear), 1e-300)))
+
+
+def _smallest_part(
+    placed: Charted, starved: BoolArray, share: FloatArray, uv_share: FloatArray
+) -> float:
+    """Least mean area ratio of an edge-connected starved part of LEAST_PART; 1 for none."""
+    one, other = (twins // 3 for twins in twin_halfedges(placed.mesh.edge_of_halfedge))
+    near = starved[one] & starved[other]
+    size = len(starved)
+    graph = sparse.coo_matrix((np.ones(near.sum(), bool), (one[near], other[near])), (size, size))
+    label = csgraph.connected_components(graph, directed=False)[1][starved]
+    part = np.bincount(label, share[starved])
+    uv_part = np.bincount(label, uv_share[starved])
+    large = part >= LEAST_PART
+    return float((uv_part[large] / part[large]).min(initial=1.0))

@@ -1,0 +1,212 @@
+"""`unwrap` of meshes: the same mesh with new UVs, and what is said of them."""
+
+import contextlib
+import json
+
+import numpy as np
+import pytest
+
+from parapoint import cli
+from parapoint.files.reading import read_parameterized, read_surface
+from parapoint.surfaces.parameterization import Charted, Parameterization
+from parapoint.surfaces.surface import Mesh
+from parapoint.testing import irregular_disk
+from parapoint.unwrapping.quality import quality
+from parapoint.unwrapping.unwrap import Unwrap
+
+BOX = """# a box of quads
+mtllib colours.mtl
+o box
+v 0 0 0 1 0 0
+v 1 0 0
+v 1 1 0
+v 0 1 0
+v 0 0 2
+v 1 0 2
+v 1 1 2
+v 0 1 2
+vt 0 0
+vn 0 0 1
+g sides
+usemtl red
+f 1/1/1 4/1/1 3/1/1 2/1/1
+f -4//1 6//1 7//1 8//1
+g more
+f 1 2 6 5
+f 2 3 7 6
+f 3 4 8 7
+f 4 1 5 8
+l 1/1 2/1
+"""
+NET = "1 2\n2 3\n3 4\n5 6  # one upright edge follows at the end\n6 7\n7 8\n1 5\n"
+"""Edges along which the box unfolds: two numbers a line."""
+
+
+def run(arguments: list, capsys) -> tuple[int, str, str]:
+    """Exit status, standard output and standard error of a command."""
+    with pytest.raises(SystemExit) as end:
+        cli.console.run(cli.parapoint, list(map(str, arguments)))
+    shown = capsys.readouterr()
+    return int(end.value.code or 0), shown.out, shown.err
+
+
+@pytest.fixture
+def box(tmp_path):
+    path = tmp_path / "box.obj"
+    path.write_text(BOX)
+    (tmp_path / "net.txt").write_text(NET)
+    (tmp_path / "colours.mtl").write_text("newmtl red\nKd 1 0 0\n")
+    return path
+
+
+def unfold(box, target, capsys, *more):
+    return run(["unwrap", box, "--out", target, "--seams", box.parent / "net.txt", *more], capsys)
+
+
+def test_an_obj_file_keeps_all_its_lines_but_for_the_uvs(box, tmp_path, capsys) -> None:
+    target = tmp_path / "deeper" / "out.obj"
+    target.parent.mkdir()
+    status, out, _ = unfold(box, target, capsys, "--json")
+    assert status == 0
+    facts = json.loads(out)
+    assert facts["polygons_split"] == facts["flipped"] == 0
+    assert facts["charts"] == 1
+    assert facts["stretch_worst"] < 1.001  # a net is an isometry
+    assert facts["angle_worst"] < 0.1
+    assert facts["overlap"] == "none"
+
+    def bare(text):
+        kept = [line for line in text.splitlines() if not line.startswith(("vt ", "f ", "l "))]
+        return [line.replace("../", "") for line in kept]
+
+    written = target.read_text()
+    assert bare(written) == bare(BOX)
+    faces = [line.split()[1:] for line in written.splitlines() if line.startswith("f ")]
+    given = [line.split()[1:] for line in BOX.splitlines() if line.startswith("f ")]
+    for after, before in zip(faces, given, strict=True):
+        for word, old in zip(after, before, strict=True):
+            vertex, _, normal = (*word.split("/"), "")[:3]
+            assert vertex == old.split("/")[0]
+            assert normal == (*old.split("/"), "", "")[2]
+    assert not target.with_suffix(".mtl").exists()
+    mesh, own = read_parameterized(target)
+    assert np.array_equal(mesh.vertices, read_surface(box).vertices)
+    assert own.uv.min() >= 0
+    assert own.uv.max() <= 1
+
+
+def test_a_seam_through_a_polygon_makes_it_triangles_and_says_so(
+    box, tmp_path, capsys, caplog
+) -> None:
+    # The quads are cut along 1-3, 5-7, ...: a cut that takes the diagonal 1-3 instead of 1-2-3.
+    (tmp_path / "net.txt").write_text("1 3\n3 4\n5 6\n6 7\n7 8\n1 5\n")
+    status, out, _ = unfold(box, tmp_path / "out.obj", capsys, "--json")
+    assert status == 0
+    assert json.loads(out)["polygons_split"] == 1
+    assert "they became triangles" in caplog.text
+    assert (tmp_path / "out.obj").read_text().count("\nf ") == 7
+
+
+def test_a_texture_of_the_old_uvs_is_not_shown_with_the_new(box, tmp_path, capsys, caplog) -> None:
+    (tmp_path / "colours.mtl").write_text("newmtl red\nmap_Kd wood.png\n")
+    unfold(box, tmp_path / "out.obj", capsys)
+    assert "were drawn for other UVs" in caplog.text
+    written = (tmp_path / "out.obj").read_text()
+    assert "mtllib" not in written
+    assert "usemtl red" in written
+
+
+def test_other_formats_and_one_uv_a_vertex(box, tmp_path, capsys, caplog) -> None:
+    unfold(box, tmp_path / "out.npz", capsys)
+    assert "left out: old UVs, polygons" in caplog.text
+    with np.load(tmp_path / "out.npz") as held:
+        assert held["vertices"].shape == (8, 3)
+        assert held["uv"].shape == (14, 2)
+        assert held["corners"].shape == held["faces"].shape == (12, 3)
+    unfold(box, tmp_path / "one.npz", capsys, "--per-vertex")
+    with np.load(tmp_path / "one.npz") as held:
+        assert held["uv"].shape == (8, 2)
+    unfold(box, tmp_path / "out.glb", capsys)
+    assert len(read_surface(tmp_path / "out.glb").faces) == 12
+
+
+@pytest.mark.parametrize(
+    ("seams", "more", "message"),
+    [
+        ("1 7\n", [], "line 1 is no edge of the mesh"),
+        ("1 2 3\n", [], "line 1 is not two vertex numbers"),
+        ("# none\n", [], "has no edge"),
+        (NET, ["--max-distortion", "4"], "max_distortion must be a number above 4"),
+        (NET, ["--seam-price", "-1"], "price must be a number of at least 0"),
+        (NET, ["--components", "some"], "components must be one of"),
+    ],
+)
+def test_wrong_use_is_one_line(seams, more, message, box, capsys) -> None:
+    (box.parent / "net.txt").write_text(seams)
+    target = box.parent / "out.obj"
+    status, out, err = unfold(box, target, capsys, *more)
+    assert (status, out) == (2, "")
+    assert message in err
+    assert err.count("\n") == 1
+    assert not target.exists()
+
+
+def test_options_of_meshes_are_refused_for_clouds(tmp_path, capsys) -> None:
+    np.savetxt(tmp_path / "a.xyz", np.random.default_rng(0).random((200, 3)))
+    with contextlib.chdir(tmp_path):
+        status, _, err = run(["unwrap", "a.xyz", "--out", "b.npz", "--per-vertex"], capsys)
+    assert status == 2
+    assert "--per-vertex is for meshes" in err
+
+
+def test_a_bound_that_is_missed_is_said(tmp_path, capsys, caplog) -> None:
+    mesh = irregular_disk()
+    lines = [f"v {x} {y} {z}" for x, y, z in mesh.vertices * [1, 1, 3]]
+    lines += [f"f {a} {b} {c}" for a, b, c in mesh.faces + 1]
+    (tmp_path / "disk.obj").write_text("\n".join(lines))
+    arguments = ["unwrap", tmp_path / "disk.obj", "--out", tmp_path / "out.obj"]
+    status, out, _ = run(
+        [*arguments, "--max-distortion", "4.000001", "--time-budget", "0.1"], capsys
+    )
+    assert status == 0
+    assert "overlap: none" in out
+    assert "above --max-distortion" in caplog.text
+
+
+def test_a_lower_bound_makes_a_longer_seam() -> None:
+    from benchmarks.cases import builtin
+
+    cap = builtin.sphere_cap(150, rings=8)
+    seam = []
+    for bound in (None, 4.2):
+        made = Unwrap(iterations=5, price=1e9, points=150, max_distortion=bound).unwrapped(cap)
+        report = made.report["parts"][0]
+        assert bound is None or report["end_energy"] <= bound
+        ends = cap.vertices[made.seams(cap)]
+        seam.append(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum())
+    assert seam[1] > seam[0]
+
+
+def test_quality_by_hand() -> None:
+    # Two right triangles of a unit square; the second is shrunk to a tenth.
+    vertices = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    mesh = Mesh(vertices, [[0, 1, 2], [0, 2, 3]])
+    uv = np.array([[0, 0], [0.5, 0], [0.5, 0.5], [0.6, 0.6], [0.65, 0.65], [0.6, 0.65]])
+    found = quality(Charted(mesh, Parameterization(uv, [[0, 1, 2], [3, 4, 5]])), 1000)
+    assert found.starved == pytest.approx(0.5)
+    assert found.smallest_part == pytest.approx(2 / 101)
+    assert found.flipped == 0
+    assert found.charts == 2
+    assert found.seam == pytest.approx(2**0.5)
+    assert found.filled == pytest.approx(0.12625)
+    assert found.angle_worst == pytest.approx(0, abs=1e-9)
+    assert found.texels_per_unit == pytest.approx(1000 * 0.12625**0.5)
+    scale = (1 / 0.12625) ** 0.5
+    assert found.stretch_worst == pytest.approx(1 / (0.05 * scale))
+    assert found.stretch_mean == pytest.approx((0.5 * scale + 1 / (0.05 * scale)) / 2)
+    # Sheared by one: the right angle becomes one of 45 degrees.
+    sheared = Parameterization([[0, 0], [1, 0], [2, 1], [1, 1]], mesh.faces)
+    assert quality(Charted(mesh, sheared), 1).angle_worst == pytest.approx(45)
+    assert quality(Charted(mesh, sheared), 1).charts == 1
+    mirrored = Parameterization([[0, 0], [-1, 0], [-1, 1], [0, 1]], mesh.faces)
+    assert quality(Charted(mesh, mirrored), 1).flipped == 2
