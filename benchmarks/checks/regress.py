@@ -109,7 +109,7 @@ QUALITY = (
 overlaps, seams."""
 COMPUTED = Comparison(
     "computed",
-    ("computed(points=4000)", "computed", "parapoint+slim(points=2000)"),
+    ("computed(points=4000)", "computed", "unwrap(points=2000)"),
     (
         "hand_1_i_f5000",
         "max_planck_i_f8000",
