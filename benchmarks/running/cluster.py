@@ -8,7 +8,6 @@ it asks for; one that has not ends the run with a line that says so.
 from __future__ import annotations
 
 import contextlib
-import shutil
 import socket
 import tempfile
 import threading
@@ -18,7 +17,7 @@ from concurrent.futures import CancelledError
 from pathlib import Path
 from typing import Any, Self
 
-from benchmarks.running import environment
+from benchmarks.running import environment, scratch
 from benchmarks.running.local import Local
 from benchmarks.running.tasks import Outcome, Task, Tick
 from benchmarks.store.archives import disk_said, replacing
@@ -60,14 +59,14 @@ class Remote:
         Raises:
             InputError: no scheduler answers, or it has no worker.
         """
-        shutil.rmtree(self.folder, ignore_errors=True)
+        scratch.clear(self.folder)
         self.client = self.connected(self.open)
         return self
 
     def __exit__(self, *_: object) -> None:
         """Disconnect; workers that the run has started end."""
         self.open.close()
-        shutil.rmtree(self.folder, ignore_errors=True)
+        scratch.remove(self.folder)
 
     def run(self, tasks: Sequence[Task], jobs: int) -> None:
         """Do all tasks, `jobs` at a time, so that no worker holds one that it does not run."""

@@ -19,7 +19,7 @@ from typing import Self
 
 import psutil
 
-from benchmarks.running import environment
+from benchmarks.running import environment, scratch
 from benchmarks.running.tasks import Outcome, Task, Tick
 from benchmarks.store.archives import disk_said
 from parapoint.errors import InputError
@@ -148,7 +148,7 @@ class Local:
 
     def __enter__(self) -> Self:
         """Clear what a run that was killed has left."""
-        shutil.rmtree(self.folder, ignore_errors=True)
+        scratch.clear(self.folder)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -156,7 +156,7 @@ class Local:
         for slot in self.slots:
             slot.close()
         self.selector.close()
-        shutil.rmtree(self.folder, ignore_errors=True)
+        scratch.remove(self.folder)
 
     def run(self, tasks: Sequence[Task], jobs: int) -> None:
         """Do all tasks, `jobs` at a time."""

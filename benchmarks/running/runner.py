@@ -20,7 +20,7 @@ from typing import Any, cast
 from baselines import registry
 from benchmarks.cases import models
 from benchmarks.cases.suites import Suite
-from benchmarks.running import environment, executors
+from benchmarks.running import environment, executors, scratch
 from benchmarks.running.cluster import WORKER_LOST
 from benchmarks.running.tasks import Executor, Task
 from benchmarks.store.results import MISSING, SOURCE_CHANGED, ResultRow, Store, identity, plain
@@ -170,7 +170,7 @@ def run(
     suite, chosen = _choice(suite, methods, cases, seeds, plugins)
     store = Store(folder)
     hands = executors.executor(
-        executor, store.folder / "cells", jobs=jobs, memory=memory, tick=progress.tick
+        executor, store.folder / scratch.NAME, jobs=jobs, memory=memory, tick=progress.tick
     )
     _check_readable(cases or (), store)
     limits = {

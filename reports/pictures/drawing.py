@@ -324,13 +324,23 @@ def _note(record: Path, keys: Mapping[str, str]) -> None:
     record.write_text(json.dumps(keys, indent=0, sort_keys=True) + "\n")
 
 
+PLAIN_NAME = re.compile(r"\w[\w.+-]*")
+"""Names that may stand in a record of what was drawn: no folders, nothing hidden."""
+
+
 def known_keys(record: Path) -> dict[str, str]:
-    """The keys of what was drawn before; none where the file is missing or damaged."""
+    """The keys of what was drawn before; none where the file is missing or damaged.
+
+    A folder of results may come from elsewhere, and these names become those of files: what is not
+    the plain name of a file in this very folder is left out.
+    """
     try:
         content = json.loads(record.read_bytes())
     except (OSError, ValueError):
         return {}
-    return content if isinstance(content, dict) else {}
+    if not isinstance(content, dict):
+        return {}
+    return {name: key for name, key in content.items() if PLAIN_NAME.fullmatch(name)}
 
 
 def _results(

@@ -22,7 +22,7 @@ from benchmarks.cases import models
 from benchmarks.cases.suites import Suite
 from benchmarks.checks import endurance
 from benchmarks.metrics.table import evaluate_points
-from benchmarks.running import environment, executors, runner, worker
+from benchmarks.running import environment, executors, runner, scratch, worker
 from benchmarks.running.runner import Summary, run
 from benchmarks.store.results import ResultRow, Store
 from parapoint.errors import InputError
@@ -268,7 +268,7 @@ def test_no_process_outlives_its_cell(faulty, notes):
 def test_a_method_writes_into_a_folder_that_goes_away(faulty, notes):
     assert row_of(faulty, "writer").status == "ok"
     assert not Path((notes / "cwd").read_text()).exists()
-    assert not (faulty[1].folder / "cells").exists()
+    assert not (faulty[1].folder / scratch.NAME).exists()
     assert not Path("litter").exists()
 
 

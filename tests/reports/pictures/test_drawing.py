@@ -10,7 +10,7 @@ from parapoint.surfaces.surface import Mesh
 from reports.contents import contents
 from reports.pictures import drawing as pictures
 from reports.pictures import render
-from reports.pictures.drawing import Map, draw, heat, map_file, slug
+from reports.pictures.drawing import Map, draw, heat, known_keys, map_file, slug
 
 from ..conftest import HAND, HOSTILE, NEFERTITI, Writer, ball, flat, lonlat, sheet
 
@@ -124,3 +124,10 @@ def test_the_artist_s_map_is_drawn_where_a_model_came_with_one(tmp_path):
     writer.store.reference_path(row.surface_hash).write_bytes(b"torn")
     made[0].unlink()
     assert "no picture of the artist's map" in draw(suite, folder, 1)[0]
+
+
+def test_names_in_a_record_from_elsewhere_reach_no_file_outside(tmp_path):
+    record = tmp_path / "keys.json"
+    names = ["../outside.txt", "/etc/passwd", "a/b.webp", ".hidden", "..", "", "hand.view.webp"]
+    record.write_text(json.dumps(dict.fromkeys(names, "key")))
+    assert known_keys(record) == {"hand.view.webp": "key"}
