@@ -29,7 +29,7 @@ Floats = npt.NDArray[np.float64]
 WATCHED = tuple(name for name in SUMMARY_METRICS if name != "seconds")
 """The metrics that are compared, over all faces and without those that span a seam."""
 
-DETERMINISTIC = frozenset(spec.partition("(")[0] for spec in regress.METHODS)
+DETERMINISTIC = frozenset(spec.partition("(")[0] for spec in regress.SOLVERS.methods)
 """Methods that are held to give one map each time; cells with several seeds may tell of others."""
 
 ROUNDING = 1e-6

@@ -1,14 +1,17 @@
 """`nox -s regress`: have the metric values of the methods moved?
 
-Every deterministic method runs on the `core` suite (and a few more cells, for figures that are
-known from elsewhere), and every metric of its maps is compared with the golden values:
+Deterministic methods run, and the metrics of their maps are compared with golden values, in three
+comparisons: of solvers on the `core` suite, of computed maps and of trained maps on a few models.
 
-    tests/golden/<method>.csv      case, status, metrics; one file a method
-    tests/golden/tolerances.csv    relative and absolute tolerance of each metric, and the reason
-    tests/golden/figures.csv       single values that are known, each with tolerance and reason
+    tests/golden/solvers/<method>.csv      case, status, metrics; one file a method
+    tests/golden/solvers/tolerances.csv    relative and absolute tolerance of each metric, and why
+    tests/golden/computed/...              the same for what is cut and flattened by this project
+    tests/golden/trained/...               the same for networks
+    tests/golden/figures.csv               single values that are known, with tolerance and reason
 
 Cells are kept in results/regress and run again where the method's source, the surface or the
-environment changed; metrics are computed anew where their source changed.
+environment changed; metrics are computed anew where their source changed. A change that is meant
+to move values rewrites them with --update, and its commit says by how much they moved.
 """
 
 from __future__ import annotations
@@ -32,24 +35,108 @@ from parapoint.errors import InputError
 
 GOLDEN = Path(__file__).parents[2] / "tests" / "golden"
 RESULTS = Path("results") / "regress"
-METHODS = (
-    "tutte",
-    "harmonic",
-    "lscm",
-    "bff",
-    "arap",
-    "slim(energy=symmetric_dirichlet)",
-    "slim(energy=conformal)",
-    "xatlas",
-)
-"""Every method that gives the same map each time and installs with the benchmark."""
-COLUMNS = tuple(
-    name
-    for name, metric in METRICS.items()
-    if metric.group not in ("points", "reference") and not name.endswith(WITHOUT_SPANNING)
-)
-"""Metrics compared. Without spanning faces these maps, most of them injective, read the same."""
 DIGITS = 9
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Methods, cases and metrics that are compared.
+
+    Attributes:
+        name: of the folder of golden values.
+        methods: specs of methods that give the same map each time.
+        cases: models.
+        metrics: what is compared.
+    """
+
+    name: str
+    methods: tuple[str, ...]
+    cases: tuple[str, ...]
+    metrics: tuple[str, ...]
+
+    @property
+    def folder(self) -> Path:
+        """Where the golden values and their tolerances are."""
+        return GOLDEN / self.name
+
+
+SOLVERS = Comparison(
+    "solvers",
+    (
+        "tutte",
+        "harmonic",
+        "lscm",
+        "bff",
+        "arap",
+        "slim(energy=symmetric_dirichlet)",
+        "slim(energy=conformal)",
+        "xatlas",
+    ),
+    SUITES["core"].cases,
+    tuple(
+        name
+        for name, metric in METRICS.items()
+        if metric.group not in ("points", "reference") and not name.endswith(WITHOUT_SPANNING)
+    ),
+)
+"""Every baseline that gives the same map each time and installs with the benchmark.
+
+Without spanning faces these maps, most of them injective, read the same.
+"""
+QUALITY = (
+    "angle_difference_mean_without_spanning",
+    "area_discrepancy_total_without_spanning",
+    "area_log_ratio_mean_without_spanning",
+    "area_ratio_p01_without_spanning",
+    "part_area_ratio_min_without_spanning",
+    "starved_area_fraction_without_spanning",
+    "flipped_fraction_without_spanning",
+    "flipped_uv_area_fraction_without_spanning",
+    "overlap_area_without_spanning",
+    "degenerate_uv_count",
+    "spanning_fraction",
+    "seam_length",
+    "uv_boundary_length",
+    "local_quasi_conformal_mean_without_spanning",
+    "local_area_log_ratio_mean_without_spanning",
+    "point_part_area_ratio_min",
+    "starved_point_fraction",
+    "neighbour_preservation",
+    "uv_collision_fraction",
+    "spanning_point_fraction",
+)
+"""What tells how good a map is, of a mesh and of a cloud: angles, areas, the worst part, flips,
+overlaps, seams."""
+COMPUTED = Comparison(
+    "computed",
+    ("computed(points=4000)", "computed", "unwrap(points=2000)"),
+    (
+        "hand_1_i_f5000",
+        "max_planck_i_f8000",
+        "cylinder_cgal",
+        "spot_c3d",
+        "fertility",
+        "eight_cfwen",
+        "kitten",
+        "fairing-cross@noise=0.01",
+    ),
+    QUALITY,
+)
+"""Disks, a slit cylinder, closed surfaces of genus 0, 4 and 2, a scan, a noisy cloud.
+
+On these the seam stays where it is when the vertices move by 1e-14 to 1e-12 of their coordinates.
+"""
+TRAINED = Comparison(
+    "trained",
+    tuple(
+        f"parapoint(preset={preset}, points=500, iterations=200, subset=128, device=cpu, threads=1)"
+        for preset in ("paper", "learned")
+    ),
+    ("hand_1_i_f5000", "max_planck_i_f8000"),
+    QUALITY,
+)
+"""Short runs of each preset; `benchmarks.checks.losses` holds their first steps tightly."""
+COMPARISONS = (SOLVERS, COMPUTED, TRAINED)
 
 
 @dataclass(frozen=True)
@@ -100,37 +187,40 @@ def read_rows(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def tolerances(folder: Path = GOLDEN) -> dict[str, Tolerance]:
-    """The tolerance of each metric of COLUMNS.
+def tolerances(comparison: Comparison) -> dict[str, Tolerance]:
+    """The tolerance of each metric that is compared.
 
     Raises:
         InputError: a metric has none.
     """
-    path = folder / "tolerances.csv"
+    path = comparison.folder / "tolerances.csv"
     found = {
         row["metric"]: Tolerance(float(row["relative"]), float(row["absolute"]), row["reason"])
         for row in read_rows(path)
     }
-    missing = [name for name in COLUMNS if name not in found]
+    missing = [name for name in comparison.metrics if name not in found]
     if missing:
         raise InputError(f"{path}: no tolerance for {', '.join(missing)}; add a line for each")
-    return found
+    return {name: found[name] for name in comparison.metrics}
 
 
-def golden_rows(spec: str, folder: Path = GOLDEN) -> Rows:
+def golden_rows(spec: str, comparison: Comparison) -> Rows:
     """The golden values of a method."""
-    return {row.pop("case"): row for row in read_rows(folder / f"{file_name(spec)}.csv")}
+    path = comparison.folder / f"{file_name(spec)}.csv"
+    return {row.pop("case"): row for row in read_rows(path)}
 
 
-def write_golden(spec: str, rows: Rows, folder: Path = GOLDEN) -> None:
+def write_golden(spec: str, rows: Rows, comparison: Comparison) -> None:
     """Rewrite the golden values of a method; cases that did not run now keep theirs."""
-    merged = golden_rows(spec, folder) | rows
-    order = {case: number for number, case in enumerate(SUITES["core"].cases)}
-    with (folder / f"{file_name(spec)}.csv").open("w", newline="", encoding="utf-8") as file:
+    merged = golden_rows(spec, comparison) | rows
+    order = {case: number for number, case in enumerate(comparison.cases)}
+    columns = ("status", *comparison.metrics)
+    path = comparison.folder / f"{file_name(spec)}.csv"
+    with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["case", "status", *COLUMNS])
+        writer.writerow(["case", *columns])
         for case in sorted(merged, key=lambda case: (order.get(case, len(order)), case)):
-            writer.writerow([case, *(merged[case].get(name, "") for name in ("status", *COLUMNS))])
+            writer.writerow([case, *(merged[case].get(name, "") for name in columns)])
 
 
 def text(value: float) -> str:
@@ -147,9 +237,9 @@ def moves(spec: str, golden: Rows, now: Rows, allowed: Mapping[str, Tolerance]) 
         if old != new:
             found.append(Move(file_name(spec), case, "status", old, new))
             continue
-        for column in COLUMNS:
+        for column, tolerance in allowed.items():
             old, new = before.get(column, ""), after.get(column, "")
-            excess = change(old, new, allowed[column].relative, allowed[column].absolute)
+            excess = change(old, new, tolerance.relative, tolerance.absolute)
             if excess > 1:
                 found.append(Move(file_name(spec), case, column, old, new, excess))
     return found
@@ -169,6 +259,11 @@ def change(old: str, new: str, relative: float, absolute: float) -> float:
     return abs(after - before) / tolerance if tolerance > 0 else math.inf
 
 
+def cell(status: str, values: Mapping[str, float]) -> dict[str, str]:
+    """A row of golden values: how a cell ended, and its metrics."""
+    return {"status": status} | {name: text(values.get(name, math.nan)) for name in METRICS}
+
+
 def measured(suite: Suite) -> dict[str, Rows]:
     """Values of all cells of a suite by method spec; cases whose model is missing are left out."""
     from benchmarks.commands.display import Display, print_summary
@@ -182,10 +277,9 @@ def measured(suite: Suite) -> dict[str, Rows]:
     found: dict[str, Rows] = {spec: {} for spec in suite.methods}
     for row in [*summary.kept, *summary.ran]:
         if row.case not in summary.missing:
-            values = frame.loc[row.id]
-            cell: dict[str, str] = {name: text(float(str(values[name]))) for name in COLUMNS}
+            values = {name: float(str(frame.loc[row.id][name])) for name in METRICS}
             status = "unmeasured" if row.id in summary.unmeasured else str(row.status)
-            found[summary.spec(row)][row.case] = {"status": status} | cell
+            found[summary.spec(row)][row.case] = cell(status, values)
     return found
 
 
@@ -232,21 +326,27 @@ def main(ctx: click.Context, /, *, update: bool) -> None:
     """Compare the metric values of every deterministic method with the golden ones."""
     from benchmarks.commands.display import print_table
 
-    allowed = tolerances()
-    now = measured(Suite("regress", "Golden values", SUITES["core"].cases, METHODS))
-    cells = sum(len(rows) for rows in now.values())
-    if not cells:
-        raise InputError("no model of the core suite is at hand, so there is nothing to compare")
+    allowed = {comparison.name: tolerances(comparison) for comparison in COMPARISONS}
     found: list[Move] = []
-    for spec, rows in now.items():
-        golden = {case: row for case, row in golden_rows(spec).items() if case in rows}
-        found += moves(spec, golden, rows, allowed)
-        if update:
-            write_golden(spec, rows)
+    now: dict[str, Rows] = {}
+    cells = absent = 0
+    for comparison in COMPARISONS:
+        title = f"Golden values: {comparison.name}"
+        values = measured(Suite("regress", title, comparison.cases, comparison.methods))
+        for spec, rows in values.items():
+            golden = golden_rows(spec, comparison)
+            held = {case: row for case, row in golden.items() if case in rows}
+            found += moves(spec, held, rows, allowed[comparison.name])
+            if update:
+                write_golden(spec, rows, comparison)
+            cells += len(rows)
+            absent += len(comparison.cases) - len(rows)
+        now |= values
+    if not cells:
+        raise InputError("no model is at hand, so there is nothing to compare")
     missed = missed_figures(figures(), now | _other_cells(now))
     if found or missed:
         print_table(table([*missed, *found]))
-    absent = len(METHODS) * len(SUITES["core"].cases) - cells
     print(
         f"{cells} cells compared, {absent} without their model: {len(found)} values moved, "
         f"{len(missed)} known figures missed{'; golden values rewritten' if update else ''}"

@@ -100,20 +100,22 @@ def texels(charted: Charted, size: int) -> Texels:
     plane = _Triangles.of(charted, size)
     low = np.clip(np.floor(plane.corners.min(axis=1) - RIM), 0, size).astype(np.int64)
     high = np.clip(np.ceil(plane.corners.max(axis=1) + RIM), 0, size).astype(np.int64)
-    extent = high - low
-    count = np.where(plane.flat, 0, extent.prod(axis=1))
+    extent = np.where(plane.flat[:, None], 0, high - low)
     steepness = np.linalg.norm(plane.gradients, axis=2)
     depth = np.full(size * size, -RIM, dtype=np.float32)
     face_of = np.full(size * size, -1, dtype=np.int32)
-    ends = np.cumsum(count)
+    # The lines of texels across the box of each triangle, some at a time.
+    face_of_line = np.repeat(np.arange(len(extent)), extent[:, 1])
+    lines = ranges(low[:, 1], extent[:, 1])
+    ends = np.cumsum(extent[face_of_line, 0])
     begin = 0
-    while begin < len(count):
+    while begin < len(lines):
         before = ends[begin - 1] if begin else 0
         end = max(begin + 1, int(np.searchsorted(ends, before + CANDIDATES, side="right")))
-        run = count[begin:end]
-        face = np.repeat(np.arange(begin, end), run)
-        line, column = np.divmod(ranges(np.zeros_like(run), run), np.maximum(extent[face, 0], 1))
-        line, column = line + low[face, 1], column + low[face, 0]
+        of_line = face_of_line[begin:end]
+        run = extent[of_line, 0]
+        face, line = np.repeat(of_line, run), np.repeat(lines[begin:end], run)
+        column = ranges(low[of_line, 0], run)
         weights = plane.weights(np.stack([column, line], axis=1) + 0.5, face)
         # Distance to the nearest side, in texels; negative outside.
         near = (weights / steepness[face]).min(axis=1).astype(np.float32)

@@ -21,7 +21,7 @@ def crossing_vertices(disk: Mesh, uv: FloatArray) -> IntArray:
     """
     start = np.concatenate(disk.boundary_loops)
     end = np.concatenate([np.roll(loop, -1) for loop in disk.boundary_loops])
-    segments = shapely.linestrings(np.stack([uv[start], uv[end]], axis=1))
+    segments = np.asarray(shapely.linestrings(np.stack([uv[start], uv[end]], axis=1)))
     one, other = shapely.STRtree(segments).query(segments, predicate="intersects")
     apart = (start[one] != start[other]) & (start[one] != end[other]) & (end[one] != start[other])
     return np.unique([start[one[apart]], end[one[apart]]])

@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.sparse import csgraph
 
 from parapoint.surfaces.cutting import cut_along, edge_graph, edge_lengths, path_to
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
 from parapoint.unwrapping.descent import LEAST_ENERGY, Run
+from parapoint.unwrapping.domains import signed_areas
+from parapoint.unwrapping.quality import MOST_STARVED, STARVED
 
 TRIAL_STEPS = 5
 """Steps of SLIM after which a longer seam is judged."""
 TRIALS = 3
 """The seam is as long as it should be once so many trials in a row do not pay."""
+TRIALS_TO_BOUND = 12
+"""As TRIALS, on the way to a bound."""
 MOST_BRANCHES = 10
 """The seam grows by so many branches at most where each must pay."""
+STEPS_BETWEEN = 10
+"""Steps of SLIM between two growths on the way to a bound."""
+LEAST_FALL = 0.995
+"""The way to a bound ends once steps and branches leave more than this share of the energy."""
 MOST_TO_BOUND = 40
 """The seam grows by so many branches at most on the way to a bound of the energy."""
 
@@ -26,7 +36,7 @@ def grow(run: Run, price: float) -> None:
         run: the map, which is changed.
         price: what the energy must fall by for each sqrt(area) of seam.
     """
-    _grow(run, price, LEAST_ENERGY, MOST_BRANCHES)
+    _grow(run, price, lambda _: False, MOST_BRANCHES)
 
 
 def grow_to(run: Run, energy: float) -> None:
@@ -34,13 +44,38 @@ def grow_to(run: Run, energy: float) -> None:
 
     It may not get there: a branch that brings nothing is not kept.
     """
-    _grow(run, 0.0, energy, MOST_TO_BOUND)
+    _reach(run, lambda run: run.energy <= energy)
 
 
-def _grow(run: Run, price: float, bound: float, most: int) -> None:
+def grow_to_feed(run: Run) -> None:
+    """Lead the seam on until no more than MOST_STARVED of the surface is starved of area.
+
+    It may not get there, as `grow_to`.
+    """
+    _reach(run, lambda run: starved(run) <= MOST_STARVED)
+
+
+def starved(run: Run) -> float:
+    """Share of the surface whose area ratio is below STARVED, that of the whole map being 1."""
+    area = run.mesh.face_areas / run.mesh.face_areas.sum()
+    uv_area = signed_areas(run.uv, run.mesh.faces)
+    return float(area[uv_area / uv_area.sum() < STARVED * area].sum())
+
+
+def _reach(run: Run, is_enough: Callable[[Run], bool]) -> None:
+    """Steps and branches by turns until it is enough, or neither brings anything."""
+    energy = np.inf
+    while not (is_enough(run) or run.is_late) and run.energy < LEAST_FALL * energy:
+        energy = run.energy
+        run.improve(STEPS_BETWEEN)
+        _grow(run, 0.0, is_enough, MOST_TO_BOUND)
+
+
+def _grow(run: Run, price: float, is_enough: Callable[[Run], bool], most: int) -> None:
     failed, branches = 0, 0
+    trials = TRIALS if price > 0 else TRIALS_TO_BOUND
     blocked: BoolArray = np.zeros(len(run.mesh.vertices), dtype=bool)
-    while failed < TRIALS and branches < most and run.energy > bound and not run.is_late:
+    while failed < trials and branches < most and not (run.is_late or is_enough(run)):
         lengths = edge_lengths(run.mesh)
         graph = edge_graph(run.mesh, lengths)
         distance, previous, _ = csgraph.dijkstra(
@@ -53,10 +88,14 @@ def _grow(run: Run, price: float, bound: float, most: int) -> None:
         if blocked[tip] or distance[tip] == 0:
             return
         path = np.array(path_to(previous, tip))
-        before = run.mesh, run.uv
+        before, energy = (run.mesh, run.uv), run.energy
         after = cut_along(run.mesh, np.stack([path[:-1], path[1:]], axis=1))
         run.set(after, run.uv[origin(run.mesh, after)])
         uv = run.one_to_one(TRIAL_STEPS)
+        if uv is None and price == 0:  # one step at a time needs fewer vertices held
+            run.improve(TRIAL_STEPS)
+            uv = run.uv
+            run.energy = energy
         least = price * float(distance[tip]) / run.unit
         if uv is not None and run.energy - run.energy_of(uv) > least:
             run.uv, run.energy = uv, run.energy_of(uv)

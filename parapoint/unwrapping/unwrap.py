@@ -22,7 +22,8 @@ from parapoint.surfaces.spanning import learned_seam, unfolded
 from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, Surface
 from parapoint.unwrapping.descent import LEAST_ENERGY, Run, sound
 from parapoint.unwrapping.domains import FlatteningError, check_iterations
-from parapoint.unwrapping.growth import grow, grow_to
+from parapoint.unwrapping.growth import grow, grow_to, grow_to_feed, starved
+from parapoint.unwrapping.quality import MOST_STARVED
 
 POINTS_OF_A_FACE = 100
 """Of a mesh with few faces so many points are sampled on each. Along the seams of a fish of 220
@@ -41,7 +42,8 @@ class Unwrap:
     that has less and is one to one on the cut mesh. A step after which the boundary would cross
     itself is taken anew with the vertices that cross held where they are, so the map stays one to
     one. Then the seam grows to where the map is most distorted (X. Gu et al. 2002, "Geometry
-    images"), as long as that pays, or until a bound on the energy is met.
+    images"), as long as that pays, and on until
+    hardly a place is starved of area and a bound on the energy is met.
 
     Where no map can be computed, the automatic cut (`parapoint.surfaces.cutting`) stands for it.
 
@@ -151,6 +153,7 @@ class Unwrap:
             if whole is not None and whole.energy <= run.energy + self.price * _length(mesh, seam):
                 run, seam = whole, np.zeros_like(seam)
             grow(run, self.price)
+            grow_to_feed(run)
         if self.max_distortion is not None:
             grow_to(run, self.max_distortion)
         report = {
@@ -177,7 +180,8 @@ class Unwrap:
         assert self.price is not None
         least = self.price * float(edge_lengths(mesh).min() / np.sqrt(mesh.face_areas.sum()))
         is_bounded = self.max_distortion is None or whole.energy <= self.max_distortion
-        return whole.energy - LEAST_ENERGY <= least and is_bounded
+        is_fed = starved(whole) <= MOST_STARVED
+        return whole.energy - LEAST_ENERGY <= least and is_bounded and is_fed
 
 
 def _length(mesh: Mesh, seam: BoolArray) -> float:

@@ -171,7 +171,7 @@ def test_bake_of_a_mesh_is_of_its_own_uv(model, bowl, scan, tmp_path, capsys) ->
         (["bake", "MESH", "BARE", "--out", "a.png", "--map", "colour"], "bare.xyz: has no colours"),
         (["bake", "MESH", "BARE", "--out", "a.png", "--map", "normal"], "has no normals"),
         (["bake", "MESH", "MESH", "--out", "a.png", "--map", "position"], "is a mesh; a cloud"),
-        (["bake", "SCAN", "SCAN", "--out", "a.png", "--map", "colour"], "carries no UV map"),
+        (["bake", "SCAN", "SCAN", "--out", "a.png", "--map", "colour"], "a UV map needs a mesh"),
         (["bake", "MESH", "FAR", "--out", "a.png", "--map", "position"], "does not lie on"),
         (["bake", "EMPTY", "SCAN", "--out", "a.png", "--map", "colour"], "no saved model here"),
     ],
