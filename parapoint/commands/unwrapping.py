@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -83,7 +84,9 @@ def unwrap_mesh(given: Polygons, request: Request) -> dict[str, object]:
             made = request.method.unwrapped(mesh, seed=request.seed)
         else:
             edges = read_seams(request.seams, mesh)
-            made = unwrapped_along(mesh, edges, request.method.iterations)
+            seconds = request.method.time_budget
+            deadline = math.inf if seconds is None else time.monotonic() + seconds
+            made = unwrapped_along(mesh, edges, request.method.iterations, deadline)
     except (UnsupportedError, InputError) as error:
         raise InputError(f"{request.source}: {error}") from None
     except FlatteningError as error:
