@@ -8,9 +8,20 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
+from parapoint.surfaces.frame import Frame
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 from parapoint.unwrapping.domains import FlatteningError
+
+UNIT = 100.0
+"""Radius of the meshes that libraries are given. Some of them work in single precision, and all
+have lengths built in below which they see no triangle."""
+
+
+def in_unit(vertices: FloatArray) -> FloatArray:
+    """Vertices (V, 3) around the origin, UNIT from it at most: what tools of float32 are given."""
+    frame = Frame.of(vertices)
+    return UNIT * frame.inside(vertices)
 
 
 def atlas(
@@ -54,7 +65,13 @@ def atlas(
 
 
 def joined_corners(mesh: Mesh, uv: FloatArray) -> Parameterization:
-    """The map with one row for all corners that have the same vertex and the same uv (F, 3, 2)."""
+    """The map with one row for all corners that have the same vertex and the same uv (F, 3, 2).
+
+    Raises:
+        FlatteningError: uv is not finite.
+    """
+    if not np.isfinite(uv).all():
+        raise FlatteningError("the atlas has coordinates that are not finite")
     rows = uv.reshape(-1, 2)
     corners = row_numbers(mesh.faces.reshape(-1), rows @ [1, 1j])
     return Parameterization(rows[first_rows(corners)], corners.reshape(-1, 3))

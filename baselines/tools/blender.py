@@ -13,7 +13,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from baselines.tools.atlas import joined_corners
+from baselines.tools.atlas import in_unit, joined_corners
 from parapoint.method import MissingError, UnsupportedError
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, Surface
@@ -82,7 +82,7 @@ def unwrapped(
     process, version = _waiting.pop() if _waiting else started()
     with TemporaryDirectory() as folder:
         source, target = Path(folder, "mesh.npz"), Path(folder, "uv.npy")
-        np.savez(source, vertices=vertices, faces=faces)
+        np.savez(source, vertices=in_unit(vertices), faces=faces)
         task = {"source": str(source), "target": str(target)}
         output, _ = process.communicate(
             json.dumps(task | {"operator": operator, "options": options}) + "\n"

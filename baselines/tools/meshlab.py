@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from baselines.tools.atlas import joined_corners, row_numbers
+from baselines.tools.atlas import in_unit, joined_corners, row_numbers
 from baselines.tools.optional import optional
 from parapoint.method import UnsupportedError
 from parapoint.surfaces.parameterization import Parameterization
@@ -71,7 +71,7 @@ def disk_map(surface: Surface, name: str) -> Parameterization:
     """
     disk = domain(surface)
     check_triangles(disk.vertices, disk.faces)
-    made = filtered(disk.vertices, disk.faces, name)
+    made = filtered(in_unit(disk.vertices), disk.faces, name)
     return Parameterization(scaled(disk, made.current_mesh().vertex_tex_coord_matrix()), disk.faces)
 
 
@@ -107,14 +107,15 @@ class MeshLabVoronoi:
                 f"needs at least {2 * self.regions} vertices for {self.regions} regions; "
                 f"there are {len(surface.vertices)}"
             )
+        unit = Mesh(in_unit(surface.vertices), surface.faces)
         made = filtered(
-            surface.vertices,
-            surface.faces,
+            unit.vertices,
+            unit.faces,
             "generate_voronoi_atlas_parametrization",
             regionnum=self.regions,
         )
         atlas = made.mesh(len(made) - 1)  # this filter makes a new mesh
-        face, turn = matched_faces(surface, atlas.vertex_matrix(), atlas.face_matrix())
+        face, turn = matched_faces(unit, atlas.vertex_matrix(), atlas.face_matrix())
         uv = atlas.wedge_tex_coord_matrix().reshape(-1, 3, 2)[face]
         uv = uv[np.arange(len(uv))[:, None], (np.arange(3) + turn[:, None]) % 3]
         return joined_corners(surface, uv)
@@ -145,7 +146,7 @@ class MeshLabTriangles:
         if not isinstance(surface, Mesh):
             raise UnsupportedError("needs faces; the surface is a point cloud")
         made = filtered(
-            surface.vertices,
+            in_unit(surface.vertices),
             surface.faces,
             "compute_texcoord_parametrization_triangle_trivial_per_wedge",
             textdim=self.page_size,

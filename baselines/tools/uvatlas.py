@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from baselines.tools.atlas import joined_corners
+from baselines.tools.atlas import in_unit, joined_corners
 from baselines.tools.optional import optional
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
@@ -70,7 +70,7 @@ class UVAtlas:
             raise UnsupportedError("needs faces; the surface is a point cloud")
         library = open3d()
         made = library.t.geometry.TriangleMesh(
-            library.core.Tensor(surface.vertices.astype(np.float32)),
+            library.core.Tensor(in_unit(surface.vertices).astype(np.float32)),
             library.core.Tensor(surface.faces.copy()),
         )
         try:

@@ -7,9 +7,10 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from baselines.tools.atlas import atlas
+from baselines.tools.atlas import UNIT, atlas, in_unit
 from baselines.tools.optional import optional
 from parapoint.method import UnsupportedError
+from parapoint.surfaces.frame import Frame
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh, Surface
 from parapoint.unwrapping.domains import FlatteningError
@@ -54,9 +55,13 @@ class UVUnwrap:
         """
         if not isinstance(surface, Mesh):
             raise UnsupportedError("needs faces; the surface is a point cloud")
-        given = uvunwrap.Mesh(surface.vertices, surface.faces.astype(np.uint32))
+        unit = UNIT / Frame.of(surface.vertices).scale
+        options = asdict(self)
+        options["max_boundary_length"] *= unit
+        options["max_chart_area"] *= unit**2
+        given = uvunwrap.Mesh(in_unit(surface.vertices), surface.faces.astype(np.uint32))
         try:
-            made = uvunwrap.generate([given], **asdict(self))
+            made = uvunwrap.generate([given], **options)
         except BaseException as error:
             if type(error).__name__ == "PanicException":  # Rust's; no subclass of Exception
                 raise FlatteningError(f"uvunwrap panicked: {error}") from None

@@ -7,9 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from baselines.tools.atlas import atlas
+from baselines.tools.atlas import UNIT, atlas, in_unit
 from baselines.tools.optional import optional
 from parapoint.method import UnsupportedError
+from parapoint.surfaces.frame import Frame
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh, Surface
 
@@ -27,6 +28,8 @@ CHART_OPTIONS = {
     "fix_winding",
 }
 """Fields of Xatlas that are attributes of xatlas.ChartOptions; the others are of PackOptions."""
+DIMENSIONS = {"max_chart_area": 2, "max_boundary_length": 1, "texels_per_unit": -1}
+"""Fields that are lengths to some power, and the power."""
 
 
 @dataclass(frozen=True)
@@ -91,14 +94,19 @@ class Xatlas:
         if not isinstance(surface, Mesh):
             raise UnsupportedError("needs faces; the surface is a point cloud")
         made = xatlas.Atlas()
-        made.add_mesh(surface.vertices.astype(np.float32), surface.faces.astype(np.uint32))
+        vertices = in_unit(surface.vertices)
+        unit = UNIT / Frame.of(surface.vertices).scale
+        made.add_mesh(vertices.astype(np.float32), surface.faces.astype(np.uint32))
         chart_options, pack_options = xatlas.ChartOptions(), xatlas.PackOptions()
         for field in fields(self):
             options = chart_options if field.name in CHART_OPTIONS else pack_options
             name = {"block_align": "blockAlign", "brute_force": "bruteForce"}.get(
                 field.name, field.name
             )
-            setattr(options, name, getattr(self, field.name))
+            value = getattr(self, field.name)
+            if field.name in DIMENSIONS:
+                value *= unit ** DIMENSIONS[field.name]
+            setattr(options, name, value)
         made.generate(chart_options, pack_options)
         source, corners, uv = made.get_mesh(0)
         page, _ = made.get_mesh_vertex_assignment(0)

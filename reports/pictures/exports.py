@@ -101,9 +101,15 @@ def glb(mesh: Mesh, parameterization: Parameterization, texture: npt.NDArray[np.
         doubleSided=True,
     )
     visual = made.TextureVisuals(parameterization.uv[pairs[:, 1]], material=material)
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    middle = low + (high - low) / 2  # glTF has single precision: the node carries it to its place
     shape = trimesh.Trimesh(
-        mesh.vertices[pairs[:, 0]], corners.reshape(-1, 3), visual=visual, process=False
+        mesh.vertices[pairs[:, 0]] - middle, corners.reshape(-1, 3), visual=visual, process=False
     )
-    content = shape.export(file_type="glb")
+    place = np.eye(4)
+    place[:3, 3] = middle
+    scene: Any = trimesh.Scene()
+    scene.add_geometry(shape, transform=place)
+    content = scene.export(file_type="glb")
     assert isinstance(content, bytes)
     return content

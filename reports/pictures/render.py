@@ -18,6 +18,7 @@ import numpy.typing as npt
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+from parapoint.surfaces.frame import Frame
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
 
 Image = npt.NDArray[np.uint8]
@@ -98,6 +99,7 @@ class Rays:
 
     def __init__(self, mesh: Mesh, *, embree: bool = True) -> None:
         self._mesh = mesh
+        self._frame = Frame.of(mesh.vertices)  # embree works in single precision
         self._scene: Any = None
         self._tree: Any = None
         if embree:
@@ -109,21 +111,26 @@ class Rays:
             else:
                 self._scene = EmbreeScene()
                 TriangleMesh(
-                    self._scene, mesh.vertices.astype(np.float32), mesh.faces.astype(np.int32)
+                    self._scene,
+                    self._frame.inside(mesh.vertices).astype(np.float32),
+                    mesh.faces.astype(np.int32),
                 )
         if self._scene is None:
             self._tree = igl.AABB()
             self._tree.init(mesh.vertices, mesh.faces)
 
-    def first(self, origins: Floats, directions: Floats) -> tuple[IntArray, Floats]:
+    def _near(self, origins: FloatArray) -> Floats:
+        return self._frame.inside(origins).astype(np.float32)
+
+    def first(self, origins: FloatArray, directions: Floats) -> tuple[IntArray, Floats]:
         """(n,) the face that each ray meets first, -1 for none; (n, 2) weights of corners 1, 2."""
         if self._scene is not None:
-            hit = self._scene.run(origins, directions, query="INTERSECT", output=True)
+            hit = self._scene.run(self._near(origins), directions, query="INTERSECT", output=True)
             return hit["primID"].astype(np.int64), np.stack([hit["u"], hit["v"]], axis=1)
         face, _, weights = self._tree.intersect_ray_first(
             self._mesh.vertices,
             self._mesh.faces,
-            origins.astype(np.float64),
+            origins,
             directions.astype(np.float64),
             np.inf,
         )
@@ -131,10 +138,10 @@ class Rays:
         known = np.where(face[:, None] >= 0, weights[:, -2:], 0)
         return face, known.astype(np.float32)
 
-    def blocked(self, origins: Floats, directions: Floats) -> BoolArray:
+    def blocked(self, origins: FloatArray, directions: Floats) -> BoolArray:
         """(n,) whether each ray meets the surface."""
         if self._scene is not None:
-            found = self._scene.run(origins, directions, query="OCCLUDED")
+            found = self._scene.run(self._near(origins), directions, query="OCCLUDED")
             return np.asarray(found >= 0)
         return np.asarray(self.first(origins, directions)[0] >= 0)
 
@@ -201,9 +208,7 @@ class Scene:
             cosine = sign * normals @ directions.T
             at, toward = np.nonzero(cosine > 0.02)
             origins = mesh.vertices + sign * 1e-3 * self.size * normals
-            blocked = self.rays.blocked(
-                origins[at].astype(np.float32), directions[toward].astype(np.float32)
-            )
+            blocked = self.rays.blocked(origins[at], directions[toward].astype(np.float32))
             weight = cosine[at, toward]
             total = np.bincount(at, weight, len(normals))
             free = np.bincount(at[~blocked], weight[~blocked], len(normals))
@@ -225,7 +230,7 @@ class Scene:
         y = 1 - (np.arange(height * samples) + 0.5) / (height * samples) * 2
         right, up, toward = camera.axes * np.append(camera.half, 2 * self.size)[:, None]
         grid = (y[:, None, None] * up + x[None, :, None] * right).reshape(-1, 3)
-        origins = (grid + (camera.centre + toward)).astype(np.float32)
+        origins = grid + (camera.centre + toward)
         directions = np.broadcast_to(-camera.axes[2].astype(np.float32), origins.shape).copy()
         hit, weights = self.rays.first(origins, directions)
         sample = np.flatnonzero(hit >= 0)

@@ -123,7 +123,7 @@ def test_a_corner_that_is_not_finite_is_not_joined_with_another():
     assert len(joined_corners(mesh, uv).uv) == len(mesh.vertices)
     number = row_numbers(mesh.faces.reshape(-1)).reshape(-1, 3)
     uv[number == number.max()] = np.nan  # of the vertex that comes last
-    with pytest.raises(InputError, match="uv must be finite"):
+    with pytest.raises(FlatteningError, match="not finite"):
         joined_corners(mesh, uv)
 
 

@@ -1,0 +1,39 @@
+"""What works in single precision maps a similar surface alike, wherever it lies, in any unit."""
+
+import numpy as np
+import pytest
+
+from baselines import registry
+from baselines.tools.atlas import UNIT, in_unit
+from parapoint.method import MissingError
+from parapoint.surfaces.parameterization import Parameterization
+from parapoint.surfaces.surface import Mesh
+from parapoint.testing import sphere
+from parapoint.unwrapping.domains import FlatteningError
+
+SIMILARITIES = [(5e5, 1.0), (6e6, 1.0), (0.0, 1e-6), (0.0, 1e6), (-7e5, 1e-3)]
+"""Shifts, in sizes of the surface, and scales."""
+
+
+@pytest.mark.parametrize("name", ["xatlas", "uvunwrap", "meshlab_triangles"])
+def test_place_and_unit_make_no_difference(name: str) -> None:
+    """The same charts, and the same map up to rounding of the positions."""
+    mesh = sphere()
+    _, method = registry.method(name)
+    try:
+        known = method.parameterize(mesh, seed=0)
+    except (MissingError, FlatteningError) as error:
+        pytest.skip(str(error))
+    assert isinstance(known, Parameterization)
+    for shift, scale in SIMILARITIES:
+        moved = Mesh(scale * (mesh.vertices + 2 * shift), mesh.faces)
+        found = method.parameterize(moved, seed=0)
+        assert isinstance(found, Parameterization)
+        assert found.charts().max() == known.charts().max()
+
+
+def test_a_unit_for_float32() -> None:
+    """Centred, and as large as said."""
+    points = np.array([[5e5, 5e6, 0], [5e5 + 2, 5e6, 0], [5e5, 5e6 + 1, 0]])
+    inside = in_unit(points)
+    assert np.linalg.norm(inside, axis=1).max() == pytest.approx(UNIT)
