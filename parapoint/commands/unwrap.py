@@ -73,6 +73,11 @@ def unwrap(
         from parapoint.unwrapping.unwrap import Unwrap
 
         check_choice("components", settings["components"], COMPONENTS)
+        grown = {"--seam-price": seam_price, "--max-distortion": max_distortion}
+        grown["--components largest"] = settings["components"] == "largest" or None
+        for option, given_value in grown.items():
+            if seams is not None and given_value is not None:
+                raise InputError(f"{option} does not go with --seams, which are cut as they are")
         request = Request(
             surface,
             out,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -83,7 +84,9 @@ def unwrap_mesh(given: Polygons, request: Request) -> dict[str, object]:
             made = request.method.unwrapped(mesh, seed=request.seed)
         else:
             edges = read_seams(request.seams, mesh)
-            made = unwrapped_along(mesh, edges, request.method.iterations)
+            seconds = request.method.time_budget
+            deadline = math.inf if seconds is None else time.monotonic() + seconds
+            made = unwrapped_along(mesh, edges, request.method.iterations, deadline)
     except (UnsupportedError, InputError) as error:
         raise InputError(f"{request.source}: {error}") from None
     except FlatteningError as error:
@@ -93,6 +96,8 @@ def unwrap_mesh(given: Polygons, request: Request) -> dict[str, object]:
     facts: dict[str, object] = {"file": request.out, "faces": len(mesh.faces), **found.facts()}
     parts = [part for part in _parts(made) if "end_energy" in part]
     facts["overlap"] = "none" if all(part["bijective"] for part in parts) else "some"
+    if found.flipped or "duplicate" in str(made.report.get("steps", "")):
+        facts["overlap"] = "unknown"  # a face that was turned or left out may lie on another
     facts["energy"] = round(max(float(str(part["end_energy"])) for part in parts), 4)
     facts["components"] = mesh.component_count
     facts |= _written(placed, places, given.extras, request)

@@ -136,8 +136,8 @@ def test_other_formats_and_one_uv_a_vertex(box, tmp_path, capsys, caplog) -> Non
         ("1 7\n", [], "line 1 is no edge of the mesh"),
         ("1 2 3\n", [], "line 1 is not two vertex numbers"),
         ("# none\n", [], "has no edge"),
-        (NET, ["--max-distortion", "4"], "max_distortion must be a number above 4"),
-        (NET, ["--seam-price", "-1"], "price must be a number of at least 0"),
+        (NET, ["--max-distortion", "4.1"], "--max-distortion does not go with --seams"),
+        (NET, ["--components", "largest"], "--components largest does not go with --seams"),
         (NET, ["--components", "some"], "components must be one of"),
     ],
 )
