@@ -51,7 +51,6 @@ DISPLAY: dict[str, tuple[str, str]] = {
     "automatic+slim": ("Automatic cut + SLIM", ""),
     "unwrap": ("Unwrap", "symmetric Dirichlet, one to one"),
     "parapoint+slim": ("Unwrap", "symmetric Dirichlet, one to one"),
-    "unwrap": ("Unwrap", ""),
     "computed": ("Computed map", ""),
     "parapoint(preset=learned)": ("ParaPoint, our training", ""),
     "parapoint": ("ParaPoint", ""),
