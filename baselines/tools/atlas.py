@@ -8,20 +8,9 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from parapoint.surfaces.frame import Frame
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 from parapoint.unwrapping.domains import FlatteningError
-
-UNIT = 100.0
-"""Radius of the meshes that libraries are given. Some of them work in single precision, and all
-have lengths built in below which they see no triangle."""
-
-
-def in_unit(vertices: FloatArray) -> FloatArray:
-    """Vertices (V, 3) around the origin, UNIT from it at most: what tools of float32 are given."""
-    frame = Frame.of(vertices)
-    return UNIT * frame.inside(vertices)
 
 
 def atlas(

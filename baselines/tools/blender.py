@@ -13,8 +13,9 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from baselines.tools.atlas import in_unit, joined_corners
+from baselines.tools.atlas import joined_corners
 from parapoint.method import MissingError, UnsupportedError
+from parapoint.surfaces.frame import in_unit
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, Surface
 from parapoint.unwrapping.domains import FlatteningError, check_iterations, domain, scaled

@@ -7,9 +7,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from baselines.tools.atlas import in_unit, joined_corners, row_numbers
+from baselines.tools.atlas import joined_corners, row_numbers
 from baselines.tools.optional import optional
 from parapoint.method import UnsupportedError
+from parapoint.surfaces.frame import in_unit
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, Surface
 from parapoint.unwrapping.domains import FlatteningError, check_triangles, domain, scaled

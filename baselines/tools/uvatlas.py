@@ -8,10 +8,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from baselines.tools.atlas import in_unit, joined_corners
+from baselines.tools.atlas import joined_corners
 from baselines.tools.optional import optional
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
+from parapoint.surfaces.frame import in_unit
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh, Surface
 from parapoint.unwrapping.domains import FlatteningError

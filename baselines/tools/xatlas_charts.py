@@ -7,10 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from baselines.tools.atlas import UNIT, atlas, in_unit
+from baselines.tools.atlas import atlas
 from baselines.tools.optional import optional
 from parapoint.method import UnsupportedError
-from parapoint.surfaces.frame import Frame
+from parapoint.surfaces.frame import UNIT, Frame, in_unit
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh, Surface
 

@@ -52,3 +52,13 @@ class Frame:
 
 IDENTITY = Frame(np.zeros(3), 1.0)
 """The frame that leaves points as they are."""
+
+UNIT = 100.0
+"""Radius of the meshes that libraries are given. Some of them work in single precision, and all
+have lengths built in below which they see no triangle."""
+
+
+def in_unit(vertices: FloatArray) -> FloatArray:
+    """Vertices (V, 3) around the origin, UNIT from it at most: what tools of float32 are given."""
+    frame = Frame.of(vertices)
+    return UNIT * frame.inside(vertices)

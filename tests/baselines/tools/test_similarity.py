@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from baselines import registry
-from baselines.tools.atlas import UNIT, in_unit
 from parapoint.method import MissingError
+from parapoint.surfaces.frame import UNIT, in_unit
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh
 from parapoint.testing import sphere
