@@ -10,12 +10,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from benchmarks.metrics.distortion import FaceDistortion, Triangles, percentile
 from parapoint.surfaces.parameterization import Parameterization
-from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, edge_table
+from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, edge_components
 
 STARVED = 0.25
 """Ratio r below which a place of the surface is starved of area."""
@@ -44,22 +42,10 @@ class Worst:
         Parts connect on the surface, across seams.
         """
         starved = np.flatnonzero(self.distortion.area_ratio < STARVED)
-        label = _face_parts(self.mesh.faces[self.distortion.faces[starved]])
+        label = edge_components(self.mesh.faces[self.distortion.faces[starved]])
         share = np.bincount(label, self.distortion.area[starved]).astype(np.float64)
         uv_share = np.bincount(label, self.distortion.uv_area[starved])
         return share, np.asarray(uv_share / share, dtype=np.float64)
-
-
-def _face_parts(faces: IntArray) -> IntArray:
-    """(F,) the part, from 0, of each of (F, 3) faces; faces that share an edge are in one."""
-    if not len(faces):
-        return np.zeros(0, dtype=np.int64)
-    edges, edge, _ = edge_table(faces)
-    face = np.repeat(np.arange(len(faces)), 3)
-    size = len(faces) + len(edges)
-    graph = sparse.coo_matrix((np.ones(len(face), bool), (face, len(faces) + edge)), (size, size))
-    label = csgraph.connected_components(graph, directed=False)[1][: len(faces)]
-    return np.asarray(np.unique(label, return_inverse=True)[1], dtype=np.int64)
 
 
 def area_ratio_p01(worst: Worst) -> float:

@@ -21,7 +21,14 @@ from parapoint.computed.denoising import denoised
 from parapoint.computed.layout import scaled_layout
 from parapoint.computed.reconstruction import ReconstructionError, defects, triangulation
 from parapoint.computed.scale import area_discrepancy, even_scale, log_scale, mapped_areas, turning
-from parapoint.surfaces.cutting import cut_along, cut_to_disk
+from parapoint.surfaces.cutting import (
+    cut_along,
+    cut_to_disk,
+    edge_graph,
+    edge_lengths,
+    origin,
+    path_to,
+)
 from parapoint.surfaces.parameterization import Charted, Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 
@@ -126,7 +133,7 @@ def flattened(points: FloatArray, deadline: float = math.inf) -> Flattened:
         raise ReconstructionError(f"the triangulation has no flat map ({error})") from None
     uv -= (uv.max(axis=0) + uv.min(axis=0)) / 2
     uv *= np.sqrt(disk.face_areas.sum() / signed_areas(uv, disk.faces).sum())
-    return Flattened(reached, mesh, disk, _origin(mesh, disk), uv, is_denoised)
+    return Flattened(reached, mesh, disk, origin(mesh, disk), uv, is_denoised)
 
 
 def flat_map(points: FloatArray, deadline: float = math.inf) -> FlatMap:
@@ -188,26 +195,15 @@ def _layout(disk: Mesh) -> FloatArray | None:
     return scaled_layout(disk, even_scale(disk))
 
 
-def _origin(mesh: Mesh, cut: Mesh) -> IntArray:
-    """(M,) the vertex of `mesh` that each one of `cut` is or copies."""
-    origin = np.empty(len(cut.vertices), dtype=np.int64)
-    origin[cut.faces] = mesh.faces
-    return origin
-
-
 def _graph(mesh: Mesh) -> sparse.csr_matrix:
     """The symmetric (V, V) graph of the edges; their lengths plus the mean, so few are best."""
-    i, j = mesh.edges.T
-    length = np.linalg.norm(mesh.vertices[i] - mesh.vertices[j], axis=1)
-    upper = sparse.coo_matrix((length + length.mean(), (i, j)), (len(mesh.vertices),) * 2)
-    return (upper + upper.T).tocsr()
+    lengths = edge_lengths(mesh)
+    return edge_graph(mesh, lengths + lengths.mean())
 
 
 def _path(previous: IntArray, vertex: int) -> IntArray:
     """(n, 2) edges from `vertex` back to the root of its tree in `previous`."""
-    path = [vertex]
-    while previous[path[-1]] >= 0:
-        path.append(int(previous[path[-1]]))
+    path = path_to(previous, vertex)
     return np.stack([path[:-1], path[1:]], axis=1).astype(np.int64)
 
 

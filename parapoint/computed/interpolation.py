@@ -97,7 +97,7 @@ class Interpolant:
 def shepard_weights(squared: FloatArray) -> FloatArray:
     """(N, K) weights of the first K of K + 1 squared distances, ascending, infinite if missing.
 
-    The last one is R²; where it is missing, R is half as much again as the root of the largest.
+    The last one is R²; where it is missing, R² is half as much again as the largest.
     """
     distance = np.sqrt(np.maximum(squared, NEAREST**2))
     known = np.where(np.isfinite(distance), distance, 0.0)

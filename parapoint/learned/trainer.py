@@ -322,9 +322,8 @@ class Trainer:
         except losses.NotFiniteError:
             return {"total": math.nan}
         total = torch.stack([self.weights[name] * value for name, value in terms.items()]).sum()
-        if total.requires_grad:  # anchored networks train nothing in the point branch
-            total.backward()  # type: ignore[no-untyped-call]
-            self.optimizer.step(self._learning_rate())
+        total.backward()  # type: ignore[no-untyped-call]
+        self.optimizer.step(self._learning_rate())
         return {name: value.item() for name, value in {**terms, "total": total}.items()}
 
     def _learning_rate(self) -> float:

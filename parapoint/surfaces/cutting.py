@@ -178,6 +178,13 @@ def _far_path(mesh: Mesh, lengths: FloatArray) -> BoolArray:
     return edge_mask(mesh, np.stack([path[:-1], path[1:]], axis=1))
 
 
+def origin(mesh: Mesh, cut: Mesh) -> IntArray:
+    """(V',) the vertex of `mesh` that each one of `cut`, the same mesh cut open, is or copies."""
+    rows = np.empty(len(cut.vertices), dtype=np.int64)
+    rows[cut.faces] = mesh.faces
+    return rows
+
+
 def path_to(previous: IntArray, vertex: int) -> list[int]:
     """The vertices from one back to the root of its tree, given each vertex's predecessor (V,)."""
     path = [vertex]

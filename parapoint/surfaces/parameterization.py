@@ -9,11 +9,17 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from parapoint.errors import InputError
-from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh, edge_table, read_only
+from parapoint.surfaces.surface import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    Mesh,
+    edge_components,
+    edge_table,
+    read_only,
+)
 
 
 class TracePoint(NamedTuple):
@@ -88,15 +94,7 @@ class Parameterization:
 
     @cached_property
     def _charts(self) -> IntArray:
-        face = np.repeat(np.arange(len(self.corners)), 3)
-        # Faces and their edges as one graph: a path between two faces runs through shared edges.
-        size = len(self.corners) + len(self.edges)
-        graph = sparse.coo_matrix(
-            (np.ones(len(face), dtype=bool), (face, len(self.corners) + self.edge_of_halfedge)),
-            shape=(size, size),
-        )
-        label = csgraph.connected_components(graph, directed=False)[1][: len(self.corners)]
-        return np.asarray(label, dtype=np.int64)
+        return edge_components(self.corners)
 
     def charts(self) -> IntArray:
         """(F,) the chart of each face: faces that share a UV edge (two rows of `uv`) are in one.

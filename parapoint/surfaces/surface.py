@@ -89,6 +89,24 @@ def unit_normals(points: FloatArray, triangles: IntArray) -> FloatArray:
     return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300))
 
 
+def edge_components(triangles: IntArray) -> IntArray:
+    """(F,) the component, from 0, of each of (F, 3) triangles; those that share an edge are in one.
+
+    Components are numbered in the order of their first triangles.
+    """
+    if not len(triangles):
+        return np.zeros(0, dtype=np.int64)
+    edges, edge, _ = edge_table(triangles)
+    triangle = np.repeat(np.arange(len(triangles)), 3)
+    # Triangles and their edges as one graph: a path between two runs through shared edges.
+    size = len(triangles) + len(edges)
+    graph = sparse.coo_matrix(
+        (np.ones(len(triangle), dtype=bool), (triangle, len(triangles) + edge)), (size, size)
+    )
+    label = csgraph.connected_components(graph, directed=False)[1][: len(triangles)]
+    return np.asarray(label, dtype=np.int64)
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """A triangle mesh.

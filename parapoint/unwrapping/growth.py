@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from scipy.sparse import csgraph
 
-from parapoint.surfaces.cutting import cut_along, edge_graph, edge_lengths, path_to
-from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
+from parapoint.surfaces.cutting import cut_along, edge_graph, edge_lengths, origin, path_to
+from parapoint.surfaces.surface import BoolArray, FloatArray
 from parapoint.unwrapping.descent import LEAST_ENERGY, Run
 from parapoint.unwrapping.domains import signed_areas
 from parapoint.unwrapping.quality import MOST_STARVED, STARVED
@@ -115,10 +115,3 @@ def _excess(run: Run) -> FloatArray:
     rows = run.mesh.faces.reshape(-1)
     excess = np.repeat(run.densities(run.uv) - LEAST_ENERGY, 3)
     return np.asarray(np.bincount(rows, weight * excess) / np.bincount(rows, weight))
-
-
-def origin(mesh: Mesh, cut: Mesh) -> IntArray:
-    """(V',) the vertex of `mesh` that each one of `cut`, the same mesh cut open, is or copies."""
-    rows = np.empty(len(cut.vertices), dtype=np.int64)
-    rows[cut.faces] = mesh.faces
-    return rows
