@@ -8,6 +8,7 @@ it asks for; one that has not ends the run with a line that says so.
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import socket
 import tempfile
 import threading
@@ -19,7 +20,7 @@ from typing import Any, Self
 
 from benchmarks.running import environment, scratch
 from benchmarks.running.local import Local
-from benchmarks.running.tasks import Outcome, Task, Tick
+from benchmarks.running.tasks import MeasureJob, Outcome, RunJob, Task, Tick, from_json, to_json
 from benchmarks.store.archives import disk_said, replacing
 from parapoint.errors import InputError
 
@@ -89,13 +90,13 @@ class Remote:
     def _sent(self, task: Task) -> Any:
         """The future of a task."""
         plugins = []
-        for plugin in task.job.get("plugins", ()):
+        for plugin in task.job.plugins if isinstance(task.job, RunJob) else ():
             path, _, name = plugin.rpartition(":")
             plugins.append((Path(path).name, name, Path(path).read_bytes()))
-        inputs = {name: path.read_bytes() for name, path in task.inputs.items()}
+        inputs = {name: path.read_bytes() for name, path in task.job.inputs.items()}
         return self.client.submit(
             performed,
-            task.job,
+            to_json(task.job),
             inputs,
             plugins,
             self.threads,
@@ -113,10 +114,10 @@ class Remote:
         import distributed
 
         try:
-            outcome, printed, content = future.result()
+            line, content = future.result()
+            outcome = from_json(line, Outcome)
         except distributed.KilledWorker:
-            outcome = {"status": "failed", "reason": WORKER_LOST, "took": 0.0}
-            printed, content = "", b""
+            outcome, content = Outcome("failed", WORKER_LOST), b""
         except (CancelledError, OSError):
             raise InputError(
                 "the dask scheduler is gone; earlier results are intact: run the same command again"
@@ -127,7 +128,7 @@ class Remote:
         if content:
             with disk_said(path), replacing(path) as stream:
                 stream.write(content)
-        task.ended(outcome, printed, path)
+        task.ended(outcome, path)
 
 
 _worker = threading.local()
@@ -135,23 +136,23 @@ _worker = threading.local()
 
 
 def performed(
-    job: Mapping[str, Any],
+    line: bytes,
     inputs: Mapping[str, bytes],
     plugins: Sequence[tuple[str, str, bytes]],
     threads: int,
     project: str,
     *,
     modules: tuple[str, ...],
-) -> tuple[Outcome, str, bytes]:
-    """Do a task on a worker: its outcome, the last lines printed, and the map file.
+) -> tuple[bytes, bytes]:
+    """Do a job on a worker: its outcome as a line of JSON, and the content of its map file.
 
     Args:
-        job: what the supervisor is told.
-        inputs: the content of the files that the task reads.
+        line: the job, as `to_json` writes it; its paths are those of the run's machine.
+        inputs: the content of the files that the job reads, by the names of their fields.
         plugins: file name, class and source of each method that comes with it.
-        threads: how many threads it may use.
+        threads: how many threads the job may use.
         project: version of the project that sends it.
-        modules: what its supervisor is to have imported.
+        modules: packages that the supervisor imports before it forks.
 
     Raises:
         InputError: this worker has another version, or its disk is full.
@@ -162,30 +163,33 @@ def performed(
             f"the dask worker on {host} has another version of the project, or of a package that "
             "it asks for; give it the same, and start it again"
         )
+    job = from_json(line, RunJob, MeasureJob)
     if not hasattr(_worker, "local"):
         _worker.local = Local(Path(), threads, lambda: None)
     local: Local = _worker.local
-    answers: list[tuple[Outcome, str, bytes]] = []
+    answers: list[tuple[bytes, bytes]] = []
 
-    def ended(outcome: Outcome, printed: str, path: Path) -> None:
-        outcome["host"] = f"{host} ({environment.processor()})"
-        answers.append((outcome, printed, path.read_bytes() if path.exists() else b""))
+    def ended(outcome: Outcome, path: Path) -> None:
+        outcome = dataclasses.replace(outcome, host=f"{host} ({environment.processor()})")
+        answers.append((to_json(outcome), path.read_bytes() if path.exists() else b""))
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         local.folder = folder / "cells"
-        places = {key: folder / f"{key}.npz" for key in inputs}
-        for key, path in places.items():
-            path.write_bytes(inputs[key])
+        places = {field: folder / f"{field}.npz" for field in inputs}
+        for field, path in places.items():
+            path.write_bytes(inputs[field])
+        job = job.reading(places)
         locations = []
         for n, (file, kind, source) in enumerate(plugins):
             path = folder / str(n) / file
             path.parent.mkdir()
             path.write_bytes(source)
             locations.append(f"{path}:{kind}")
-        task = Task({**job, "plugins": locations}, places, lambda: None, ended, modules)
+        if isinstance(job, RunJob):
+            job = dataclasses.replace(job, plugins=tuple(locations))
         try:
-            local.run([task], 1)
+            local.run([Task(job, lambda: None, ended, modules)], 1)
         except BaseException:
             del _worker.local
             local.__exit__()

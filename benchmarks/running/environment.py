@@ -97,8 +97,8 @@ def project() -> str:
     """
     digest = hashlib.sha256(json.dumps(_packages(), sort_keys=True).encode())
     for package in ("parapoint", "baselines", "benchmarks"):
-        for path in sorted((ROOT / package).glob("*.py")):
-            digest.update(path.name.encode() + path.read_bytes())
+        for path in sorted((ROOT / package).rglob("*.py")):
+            digest.update(str(path.relative_to(ROOT)).encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 
 

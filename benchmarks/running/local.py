@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import json
+import dataclasses
 import math
 import os
 import selectors
@@ -20,7 +20,7 @@ from typing import Self
 import psutil
 
 from benchmarks.running import environment, scratch
-from benchmarks.running.tasks import Outcome, Task, Tick
+from benchmarks.running.tasks import Message, Outcome, Ready, Task, Tick, from_json, to_json
 from benchmarks.store.archives import disk_said
 from parapoint.errors import InputError
 
@@ -74,26 +74,29 @@ class _Slot:
     @property
     def time_limit(self) -> float:
         """Seconds that the task may take."""
-        return float(self.task.job["time_limit"]) if self.task else math.inf
+        return self.task.job.time_limit if self.task else math.inf
 
     def begin(self, task: Task, folder: Path) -> None:
         """Begin its task, which may write into `folder`."""
         self.printed.clear()
         self.folder = folder
         self.started = time.monotonic()
-        inputs = {name: str(path.resolve()) for name, path in task.inputs.items()}
-        places = {"map": str(folder / "map.npz"), "work": str(folder / "work")}
-        job = {**task.job, **inputs, **places}
-        with contextlib.suppress(OSError):  # a supervisor that is gone is heard of next
-            self.jobs.write(json.dumps(job).encode() + b"\n")
+        inputs = {name: path.resolve() for name, path in task.job.inputs.items()}
+        job = dataclasses.replace(task.job.reading(inputs), folder=folder)
+        with contextlib.suppress(OSError):  # `hear` notices a supervisor that is gone
+            self.jobs.write(to_json(job))
 
-    def hear(self) -> list[Outcome] | None:
-        """Outcomes that have come in; None once the supervisor is gone."""
+    def hear(self) -> list[Message] | None:
+        """The messages that have come in; None once the supervisor is gone.
+
+        Raises:
+            ValueError: a line is no message.
+        """
         content = _available(self.replies)
         if content is None:
             return None
         *lines, self.reply = (self.reply + content).split(b"\n")
-        return [json.loads(line) for line in lines]
+        return [from_json(bytes(line), Ready, Outcome) for line in lines]
 
     def drain(self) -> None:
         """Take in what was printed, so that no method waits for a reader; keep the end of it."""
@@ -195,22 +198,40 @@ class Local:
     def _listen(self) -> None:
         """Wait a moment for news, and deal with it."""
         for slot in {key.data for key, _ in self.selector.select(0.1)}:
-            news = slot.hear()
+            try:
+                news = slot.hear()
+            except ValueError as error:
+                self._lost(slot, f"the process that watched over it answered nonsense: {error}")
+                continue
             slot.drain()
-            for outcome in news or ():
-                if slot.task is not None and slot.ready:
-                    self._end(slot, outcome)
-                elif slot.task is not None:
-                    slot.ready = True
-                    self._begin(slot, slot.task)
+            for message in news or ():
+                self._take_in(slot, message)
             if news is None:
-                self._lost(slot)
+                self._lost(slot, "killed the process that watched over it")
         now = time.monotonic()
         for slot in [slot for slot in self.slots if now > slot.started + slot.time_limit + GRACE]:
-            self._lost(slot)
+            self._lost(slot, "")
 
-    def _lost(self, slot: _Slot) -> None:
-        """Deal with a supervisor that is gone or hangs: a task that it had begun ends with it."""
+    def _take_in(self, slot: _Slot, message: Message) -> None:
+        """Deal with a message of a supervisor that has a task; others say nothing of use."""
+        if slot.task is None:
+            return
+        if isinstance(message, Outcome) and slot.ready:
+            self._end(slot, message)
+        elif isinstance(message, Ready) and not slot.ready:
+            slot.ready = True
+            self._begin(slot, slot.task)
+
+    def _lost(self, slot: _Slot, reason: str) -> None:
+        """Give up a supervisor that has ended or hangs.
+
+        Args:
+            slot: the supervisor.
+            reason: why the task that it had begun fails, unless its time is over.
+
+        Raises:
+            RuntimeError: it had no task, so that nothing but our own code can have ended it.
+        """
         self.slots.discard(slot)
         self.selector.unregister(slot.replies)
         self.selector.unregister(slot.output)
@@ -222,26 +243,31 @@ class Local:
             said = last_lines(slot.printed, lines=1)
             raise RuntimeError(f"benchmarks.running.worker ended unasked: {said}")
         elif time.monotonic() > slot.started + slot.time_limit:
-            reason = f"not done within the limit of {slot.time_limit:g} s, and hard to kill"
-            self._end(slot, {"status": "timeout", "reason": reason})
+            late = f"not done within the limit of {slot.time_limit:g} s, and hard to kill"
+            self._end(slot, Outcome("timeout", late))
         else:
-            reason = "killed the process that watched over it"
-            self._end(slot, {"status": "failed", "reason": reason})
+            self._end(slot, Outcome("failed", reason))
 
     def _end(self, slot: _Slot, outcome: Outcome) -> None:
+        """Hand on the outcome of the task that a supervisor has done.
+
+        Raises:
+            InputError: this machine failed, so that the run cannot go on.
+        """
         task = slot.task
         assert task is not None
         slot.task = None
-        if outcome["status"] == "stop":
+        if outcome.fatal:
             raise InputError(
-                f"{outcome['reason']}; earlier results are intact: mend that and run again"
+                f"{outcome.reason}; earlier results are intact: mend that and run again"
             )
-        outcome["took"] = time.monotonic() - slot.started
-        task.ended(outcome, last_lines(slot.printed), slot.folder / "map.npz")
+        took, printed = time.monotonic() - slot.started, last_lines(slot.printed)
+        outcome = dataclasses.replace(outcome, took=took, printed=printed)
+        task.ended(outcome, slot.folder / "map.npz")
         shutil.rmtree(slot.folder, ignore_errors=True)
 
 
 def last_lines(printed: bytes | bytearray, lines: int = 20, characters: int = 4000) -> str:
-    """The end of what a method printed."""
+    """The last lines of what a method printed, that many characters at most."""
     text = printed.decode(errors="replace")[-characters:]
     return "\n".join(text.splitlines()[-lines:])

@@ -12,7 +12,7 @@ import functools
 import hashlib
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
@@ -22,8 +22,9 @@ from benchmarks.cases import models
 from benchmarks.cases.suites import Suite
 from benchmarks.running import environment, executors, scratch
 from benchmarks.running.cluster import WORKER_LOST
-from benchmarks.running.tasks import Executor, Task
-from benchmarks.store.results import MISSING, SOURCE_CHANGED, ResultRow, Store, identity, plain
+from benchmarks.running.tasks import Executor, MeasureJob, Outcome, RunJob, Task
+from benchmarks.store.records import plain
+from benchmarks.store.results import MISSING, SOURCE_CHANGED, ResultRow, Store, identity
 from parapoint.errors import InputError
 from parapoint.files.reading import faults_of, read_parameterized
 from parapoint.sources import source_hash
@@ -173,14 +174,12 @@ def run(
         executor, store.folder / scratch.NAME, jobs=jobs, memory=memory, tick=progress.tick
     )
     _check_readable(cases or (), store)
-    limits = {
-        "time_limit": timeout,
-        "memory_limit": memory * 1e9 if memory else 0.8 * environment.memory() / jobs,
-    }
+    memory_limit = _memory_limit(memory, jobs)
     summary = Summary(suite, chosen)
     with store.writing(), hands:
         surfaces = _surfaces(store, suite.cases, summary)
-        here = environment.environment() | limits
+        here = environment.environment()
+        here |= {"time_limit": timeout, "memory_limit": memory_limit}
         here |= {"executor": executor, "jobs": jobs, "threads": hands.threads}
         todo = summary.planned
         todo += _todo(suite, chosen, surfaces, store=store, here=here, summary=summary)
@@ -188,13 +187,13 @@ def run(
         if todo:
             number = store.add_run(here | {"suite": suite.name})
             book = _Book(store, number, summary, progress)
-            job = limits | {"plugins": [_absolute(plugin) for plugin in plugins]}
-            tasks = [book.task(cell, job) for cell in todo if cell.row.surface_hash]
+            tasks = []
             for cell in todo:
-                if not cell.row.surface_hash:
-                    book.write(
-                        cell, {"status": "skipped", "reason": summary.missing[cell.row.case]}
-                    )
+                if cell.row.surface_hash:
+                    job = _job(store, cell, plugins, timeout, memory_limit)
+                    tasks.append(book.task(cell, job))
+                else:
+                    book.write(cell, Outcome("skipped", summary.missing[cell.row.case]))
             hands.run(tasks, jobs)
         _measure(store, hands, None if executor == "local" else memory, summary, progress)
     summary.seconds = time.monotonic() - began
@@ -210,36 +209,56 @@ def _measure(
     values: dict[str, dict[str, float]] = {}
     # Another supervisor takes a second to start: it must have something to do.
     jobs = min(hands.width, 1 + len(rows) // 4)
-    limits = {
-        "measure": True,
-        "time_limit": METRICS_TIME_LIMIT,
-        "memory_limit": memory * 1e9 if memory else 0.8 * environment.memory() / jobs,
-    }
-
-    def ended(row: ResultRow) -> Callable[[dict[str, Any], str, Path], None]:
-        def note(outcome: dict[str, Any], _: str, __: Path) -> None:
-            values[row.id] = {k: float(v) for k, v in outcome.get("metrics", {}).items()}
-            if outcome["status"] != "ok":
-                summary.unmeasured[row.id] = outcome["reason"]
-            progress.measured(len(values), len(rows))
-
-        return note
+    memory_limit = _memory_limit(memory, jobs)
 
     def began() -> None:
         progress.measured(len(values), len(rows))
 
+    def ended(row: ResultRow, outcome: Outcome, _: Path) -> None:
+        values[row.id] = dict(outcome.metrics)
+        if outcome.status != "ok":
+            summary.unmeasured[row.id] = outcome.reason
+        progress.measured(len(values), len(rows))
+
     tasks = []
     for row in rows:
-        inputs = {"surface": store.scored_path(row.surface_hash), "uv": store.uv_path(row.id)}
-        tasks.append(Task(limits, inputs | _reference(store, row), began, ended(row)))
+        job = MeasureJob(
+            surface=store.scored_path(row.surface_hash),
+            reference=_reference(store, row),
+            uv=store.uv_path(row.id),
+            time_limit=METRICS_TIME_LIMIT,
+            memory_limit=memory_limit,
+        )
+        tasks.append(Task(job, began, functools.partial(ended, row)))
     hands.run(tasks, jobs)
     store.metrics(values)
 
 
-def _reference(store: Store, row: ResultRow) -> dict[str, Path]:
-    """The file of the map that the row's surface came with, as an input; none if none came."""
+def _job(
+    store: Store, cell: Cell, plugins: Sequence[str], time_limit: float, memory_limit: float
+) -> RunJob:
+    """What an executor is told of a cell."""
+    return RunJob(
+        surface=store.surface_path(cell.row.surface_hash),
+        reference=_reference(store, cell.row),
+        time_limit=time_limit,
+        memory_limit=memory_limit,
+        spec=cell.method.spec,
+        seed=cell.row.seed,
+        source_hash=cell.row.source_hash,
+        plugins=tuple(_absolute(plugin) for plugin in plugins),
+    )
+
+
+def _memory_limit(memory: float | None, jobs: int) -> float:
+    """Bytes that a job may hold: `memory` GB, else its part of four fifths of the machine's."""
+    return memory * 1e9 if memory else 0.8 * environment.memory() / jobs
+
+
+def _reference(store: Store, row: ResultRow) -> Path | None:
+    """The file of the map that the row's surface came with; None if it came with none."""
     path = store.reference_path(row.surface_hash)
-    return {"reference": path} if path.exists() else {}
+    return path if path.exists() else None
 
 
 def _absolute(plugin: str) -> str:
@@ -428,33 +447,36 @@ class _Book:
         self.summary = summary
         self.progress = progress
 
-    def task(self, cell: Cell, shared: Mapping[str, Any]) -> Task:
-        """What runs a cell and writes its row; `shared` holds the limits and plugins of all."""
-        job = {
-            **shared,
-            "spec": cell.method.spec,
-            "seed": cell.row.seed,
-            "source_hash": cell.row.source_hash,
-        }
+    def task(self, cell: Cell, job: RunJob) -> Task:
+        """What runs a cell and writes its row."""
 
-        def ended(outcome: dict[str, Any], printed: str, path: Path) -> None:
-            took = outcome.pop("took")
-            self.summary.method_seconds += outcome.get("seconds") or took
-            if outcome["status"] == "ok":
+        def ended(outcome: Outcome, path: Path) -> None:
+            self.summary.method_seconds += outcome.seconds or outcome.took
+            if outcome.status == "ok":
                 self.store.add_map(cell.row.id, path)
-                outcome["uv_file"] = f"uv/{cell.row.id}.npz"
-            else:
-                outcome["output"] = printed
             self.write(cell, outcome)
 
-        inputs = {"surface": self.store.surface_path(cell.row.surface_hash)}
-        inputs |= _reference(self.store, cell.row)
         began = functools.partial(self.progress.started, cell)
-        return Task(job, inputs, began, ended, cell.method.modules)
+        return Task(job, began, ended, cell.method.modules)
 
-    def write(self, cell: Cell, outcome: Mapping[str, Any]) -> None:
-        """Write the row of `cell`."""
-        row = dataclasses.replace(cell.row, run=self.number, **outcome)
+    def write(self, cell: Cell, outcome: Outcome) -> None:
+        """Write the row of a cell."""
+        is_ok = outcome.status == "ok"
+        row = dataclasses.replace(
+            cell.row,
+            run=self.number,
+            status=outcome.status,
+            reason=outcome.reason,
+            output="" if is_ok else outcome.printed,
+            preprocessing=outcome.preprocessing,
+            seconds=outcome.seconds,
+            cpu_seconds=outcome.cpu_seconds,
+            peak_memory_mb=outcome.peak_memory_mb,
+            uv_file=f"uv/{cell.row.id}.npz" if is_ok else "",
+            uv_sha256=outcome.uv_sha256,
+            report=outcome.report,
+            host=outcome.host,
+        )
         self.store.append(row)
         self.summary.ran.append(row)
         self.progress.ended(cell, row)

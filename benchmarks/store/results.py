@@ -17,7 +17,6 @@ file is ever unpickled.
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import errno
 import hashlib
 import io
@@ -26,13 +25,10 @@ import logging
 import math
 import os
 import re
-import typing
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
-
-import numpy as np
 
 from benchmarks.store.archives import (
     arrays_hash,
@@ -45,6 +41,7 @@ from benchmarks.store.archives import (
     sync_folder,
     write_arrays,
 )
+from benchmarks.store.records import fields_of, from_fields, loaded, plain
 from parapoint.errors import InputError
 from parapoint.sources import source_hash
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization
@@ -122,23 +119,6 @@ class ResultRow:
         return json.dumps(parts, sort_keys=True)
 
 
-def plain(value: object) -> Any:
-    """`value` as JSON can hold it: numpy to Python, numbers that are not finite to text."""
-    if isinstance(value, np.generic | np.ndarray):
-        value = value.tolist()
-    if isinstance(value, float):
-        return value if math.isfinite(value) else str(value)
-    if value is None or isinstance(value, bool | int | str):
-        return value
-    if isinstance(value, Mapping):
-        return {str(key): plain(entry) for key, entry in value.items()}
-    if isinstance(value, set | frozenset):
-        return sorted(plain(entry) for entry in value)
-    if isinstance(value, list | tuple):
-        return [plain(entry) for entry in value]
-    return str(value)
-
-
 def identity(
     *,
     suite: str,
@@ -165,24 +145,11 @@ def _write_whole(stream: int, line: bytes) -> None:
 def _row(line: bytes) -> ResultRow | None:
     """The row of a line of `runs.jsonl`, or None where the line is no whole row."""
     try:
-        row = ResultRow(**json.loads(line))
-    except (ValueError, TypeError, RecursionError):
+        row = from_fields(ResultRow, loaded(line))
+    except ValueError:
         return None
-    named = isinstance(row.id, str) and isinstance(row.surface_hash, str)
-    if not named or not _NAME.fullmatch(row.id):
-        return None
-    if row.surface_hash and not _NAME.fullmatch(row.surface_hash):
-        return None
-    texts = (row.suite, row.case, row.method, row.source_hash, row.reason, row.uv_sha256, row.host)
-    typed = (
-        all(isinstance(text, str) for text in texts)
-        and row.status in typing.get_args(Status)
-        and isinstance(row.params, dict)
-        and isinstance(row.report, dict)
-        and isinstance(row.seed, int)
-        and isinstance(row.run, int)
-    )
-    return row if typed else None
+    names = (row.id, row.surface_hash) if row.surface_hash else (row.id,)
+    return row if all(_NAME.fullmatch(name) for name in names) else None
 
 
 class Store:
@@ -528,8 +495,7 @@ class Store:
             InputError: the disk is full.
         """
         assert self._stream is not None, "append is for the process inside writing()"
-        record = plain({f.name: getattr(row, f.name) for f in dataclasses.fields(row)})
-        line = json.dumps(record).encode() + b"\n"
+        line = json.dumps(fields_of(row)).encode() + b"\n"
         before = os.fstat(self._stream).st_size
         with disk_said(self._runs):
             try:

@@ -18,6 +18,7 @@ import pytest
 
 from benchmarks.cases.suites import Suite
 from benchmarks.running import cluster, environment, executors, runner
+from benchmarks.running.tasks import Outcome
 from benchmarks.store.results import Store
 from parapoint.errors import InputError
 
@@ -166,7 +167,7 @@ def test_a_run_on_two_workers_one_of_which_dies_gives_the_rows_of_a_local_one(
 
 def test_a_worker_of_another_version_ends_the_run_in_words():
     with pytest.raises(InputError, match="has another version of the project"):
-        cluster.performed({}, {}, [], 1, "another", modules=())
+        cluster.performed(b"", {}, [], 1, "another", modules=())
 
 
 def test_a_cell_that_lost_two_workers_runs_again_next_time(tmp_path, monkeypatch):
@@ -175,8 +176,7 @@ def test_a_cell_that_lost_two_workers_runs_again_next_time(tmp_path, monkeypatch
     class Lost(executors.Local):
         def run(self, tasks, _):
             for task in tasks:
-                outcome = {"status": "failed", "reason": cluster.WORKER_LOST, "took": 0.0}
-                task.ended(outcome, "", Path())
+                task.ended(Outcome("failed", cluster.WORKER_LOST), Path())
 
     with monkeypatch.context() as patch:
         patch.setattr(executors, "Local", Lost)

@@ -22,7 +22,7 @@ from benchmarks.cases import models
 from benchmarks.cases.suites import Suite
 from benchmarks.checks import endurance
 from benchmarks.metrics.table import evaluate_points
-from benchmarks.running import environment, executors, runner, scratch, worker
+from benchmarks.running import cell, environment, executors, runner, scratch
 from benchmarks.running.runner import Summary, run
 from benchmarks.store.results import ResultRow, Store
 from parapoint.errors import InputError
@@ -159,9 +159,9 @@ class InProcess(executors.Local):
             task.began()
             path = self.folder.with_name("map.npz")
             with Path(os.devnull).open("wb") as ahead:
-                job = {**task.job, **task.inputs, "map": str(path)}
-                outcome = worker._outcome(job, ahead.fileno())
-            task.ended(outcome | {"took": 0.0}, "", path)
+                job = dataclasses.replace(task.job, folder=path.parent)
+                outcome = cell.run(job, ahead.fileno())
+            task.ended(outcome, path)
 
 
 @pytest.fixture
@@ -545,8 +545,8 @@ def test_a_killed_run_loses_only_the_cell_in_flight(tmp_path):
         run(suite("tutte"), tmp_path / "out")
     process.send_signal(signal.SIGKILL)
     process.wait()
-    cell = int((tmp_path / "2").read_text())
-    wait_until(lambda: not psutil.pid_exists(cell))
+    number = int((tmp_path / "2").read_text())
+    wait_until(lambda: not psutil.pid_exists(number))
     with (tmp_path / "out" / "runs.jsonl").open("a") as stream:
         stream.write('{"id": "a torn li')
     done = Store(tmp_path / "out").rows()

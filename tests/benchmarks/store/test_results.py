@@ -18,7 +18,8 @@ from benchmarks.store.archives import (
     trace_arrays,
     write_arrays,
 )
-from benchmarks.store.results import ResultRow, Store, identity, plain
+from benchmarks.store.records import plain
+from benchmarks.store.results import ResultRow, Store, identity
 from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization, TracePoint
 from parapoint.surfaces.surface import Mesh, PointCloud
