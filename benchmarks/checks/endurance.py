@@ -34,7 +34,7 @@ import psutil
 from baselines import registry
 from benchmarks.cases.suites import Suite
 from benchmarks.checks import faulty, instant
-from benchmarks.running import runner
+from benchmarks.running import planning, runner
 from benchmarks.store.results import Store
 from parapoint import console
 from parapoint.testing import irregular_disk
@@ -123,7 +123,7 @@ class _Report(runner.Progress):
     def __init__(self, pipe: int) -> None:
         self.pipe = pipe
 
-    def ended(self, cell: runner.Cell, row: Any) -> None:  # noqa: ARG002  as its base
+    def ended(self, cell: planning.Cell, row: Any) -> None:  # noqa: ARG002  as its base
         """Send the row's id, in one write."""
         os.write(self.pipe, f"{row.id}\n".encode())
 
@@ -284,11 +284,11 @@ class _Clock(runner.Progress):
         self.began = 0.0
         self.added: dict[str, list[float]] = {}
 
-    def started(self, cell: runner.Cell) -> None:  # noqa: ARG002  as its base
+    def started(self, cell: planning.Cell) -> None:  # noqa: ARG002  as its base
         """Start the clock."""
         self.began = time.monotonic()
 
-    def ended(self, cell: runner.Cell, row: Any) -> None:  # noqa: ARG002  as its base
+    def ended(self, cell: planning.Cell, row: Any) -> None:  # noqa: ARG002  as its base
         """Note the time since, but for that of the method."""
         if row.status == "ok":
             added = time.monotonic() - self.began - row.seconds

@@ -17,7 +17,8 @@ from rich.progress import Progress as Bar
 from rich.table import Table
 from rich.text import Text
 
-from benchmarks.running.runner import Cell, Progress, Summary
+from benchmarks.running.planning import Cell
+from benchmarks.running.runner import Progress, Summary
 
 if TYPE_CHECKING:
     from benchmarks.store.results import ResultRow

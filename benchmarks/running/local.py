@@ -1,4 +1,4 @@
-"""Cells on this machine: supervisors (`benchmarks.running.worker`) as child processes."""
+"""Runs cells on this machine, below supervisors (`benchmarks.running.worker`) that it starts."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from benchmarks.store.archives import disk_said
 from parapoint.errors import InputError
 
 GRACE = 15.0
-"""Seconds past its limit after which a supervisor itself counts as hung."""
+"""Seconds past a cell's time limit after which its supervisor counts as hung."""
 OUTPUT_KEPT = 1 << 16
-"""Bytes of a method's output that are held; what came before is dropped."""
+"""Bytes of a method's output that are kept in memory: the last ones."""
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
@@ -36,13 +36,14 @@ THREAD_VARIABLES = (
     "VECLIB_MAXIMUM_THREADS",
     "IGL_NUM_THREADS",
 )
+"""Environment variables by which libraries are told how many threads they may start."""
 
 
 class _Slot:
-    """A supervisor process, and the task that it is busy with or gets once it is ready."""
+    """A supervisor process, and the task that it does, or will do once it is ready."""
 
     def __init__(self, threads: int, modules: tuple[str, ...]) -> None:
-        """Start a supervisor with `modules`, whose children may use `threads` threads."""
+        """Start a supervisor that imports `modules` and whose cells may use `threads` threads."""
         self.modules = modules
         self.replies, send = os.pipe()
         variables = dict.fromkeys(THREAD_VARIABLES, str(threads)) | {"PYTHONHASHSEED": "0"}
@@ -73,11 +74,11 @@ class _Slot:
 
     @property
     def time_limit(self) -> float:
-        """Seconds that the task may take."""
+        """Seconds that the task may take; infinite without a task."""
         return self.task.job.time_limit if self.task else math.inf
 
     def begin(self, task: Task, folder: Path) -> None:
-        """Begin its task, which may write into `folder`."""
+        """Send the supervisor its task, which may write into `folder`."""
         self.printed.clear()
         self.folder = folder
         self.started = time.monotonic()
@@ -99,12 +100,12 @@ class _Slot:
         return [from_json(bytes(line), Ready, Outcome) for line in lines]
 
     def drain(self) -> None:
-        """Take in what was printed, so that no method waits for a reader; keep the end of it."""
+        """Read what the method has printed, so that it never waits for a reader; keep the end."""
         self.printed += _available(self.output) or b""
         del self.printed[:-OUTPUT_KEPT]
 
     def close(self) -> None:
-        """End the supervisor and with it all that runs below it."""
+        """End the supervisor, and every process below it."""
         with contextlib.suppress(OSError):
             self.jobs.close()
         try:
@@ -122,7 +123,7 @@ class _Slot:
 
 
 def _available(pipe: int) -> bytes | None:
-    """What can be read from `pipe` at once, one megabyte or so at most; None at its end."""
+    """What can be read from `pipe` without waiting, about a megabyte at most; None at its end."""
     content = bytearray()
     while len(content) < 1 << 20:
         try:
@@ -136,10 +137,16 @@ def _available(pipe: int) -> bytes | None:
 
 
 class Local:
-    """Supervisors on this machine."""
+    """The executor (`tasks.Executor`) of this machine."""
 
     def __init__(self, folder: Path, threads: int, tick: Tick) -> None:
-        """Tasks write into folders below `folder`, which goes with the executor."""
+        """An executor without supervisors yet.
+
+        Args:
+            folder: scratch folder of the run; each task writes into a folder below it.
+            threads: how many threads a cell may use.
+            tick: called several times a second.
+        """
         self.folder = folder
         self.threads = threads
         self.width = environment.cores()
@@ -147,15 +154,15 @@ class Local:
         self.selector = selectors.DefaultSelector()
         self.slots: set[_Slot] = set()
         self.harmful: set[tuple[str, ...]] = set()
-        """Modules whose import ended a supervisor: tasks import these themselves."""
+        """Modules whose import ended a supervisor; tasks that need them import them themselves."""
 
     def __enter__(self) -> Self:
-        """Clear what a run that was killed has left."""
+        """Clear what a run that was killed may have left."""
         scratch.clear(self.folder)
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End all supervisors and what runs below them."""
+        """End all supervisors, and every process below them."""
         for slot in self.slots:
             slot.close()
         self.selector.close()
@@ -171,10 +178,11 @@ class Local:
             self.tick()
 
     def _busy(self) -> int:
+        """How many supervisors have a task."""
         return sum(slot.task is not None for slot in self.slots)
 
     def _assign(self, task: Task) -> None:
-        """Give `task` to an idle supervisor that has its modules, or to a new one."""
+        """Give a task to an idle supervisor that has its modules, or to a new one."""
         modules = () if task.modules in self.harmful else task.modules
         for slot in self.slots:
             if slot.task is None and slot.modules == modules:
@@ -188,6 +196,7 @@ class Local:
         self.selector.register(slot.output, selectors.EVENT_READ, slot)
 
     def _begin(self, slot: _Slot, task: Task) -> None:
+        """Let a supervisor that is ready begin its task, in a new folder."""
         with disk_said(self.folder):
             self.folder.mkdir(exist_ok=True)
             folder = Path(tempfile.mkdtemp(dir=self.folder)).resolve()
@@ -196,7 +205,7 @@ class Local:
         task.began()
 
     def _listen(self) -> None:
-        """Wait a moment for news, and deal with it."""
+        """Wait a moment for messages, and deal with them; notice supervisors that hang."""
         for slot in {key.data for key, _ in self.selector.select(0.1)}:
             try:
                 news = slot.hear()
@@ -213,7 +222,7 @@ class Local:
             self._lost(slot, "")
 
     def _take_in(self, slot: _Slot, message: Message) -> None:
-        """Deal with a message of a supervisor that has a task; others say nothing of use."""
+        """Deal with a message. A supervisor without a task has nothing to say."""
         if slot.task is None:
             return
         if isinstance(message, Outcome) and slot.ready:

@@ -22,7 +22,7 @@ from benchmarks.cases import models
 from benchmarks.cases.suites import Suite
 from benchmarks.checks import endurance
 from benchmarks.metrics.table import evaluate_points
-from benchmarks.running import cell, environment, executors, runner, scratch
+from benchmarks.running import cell, environment, executors, planning, runner, scratch
 from benchmarks.running.runner import Summary, run
 from benchmarks.store.results import ResultRow, Store
 from parapoint.errors import InputError
@@ -235,7 +235,7 @@ def test_a_cell_that_does_not_end_says_what_was_done_to_its_surface(tmp_path):
 def test_modules_that_end_a_supervisor_are_left_to_the_cells(tmp_path, monkeypatch):
     (tmp_path / "harmful.py").write_text("import os\nos._exit(3)\n")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    monkeypatch.setattr(runner, "SLOW", ("harmful",))
+    monkeypatch.setattr(planning, "SLOW", ("harmful",))
     monkeypatch.setattr(registry, "imports", lambda *_: True)
     monkeypatch.setattr(runner, "_measure", lambda *_: None)
     ran = run(suite("tutte", seeds=(0, 1)), tmp_path / "out").ran
@@ -682,4 +682,4 @@ def test_what_did_not_end_well_runs_again_only_where_it_may_end_better(
     tmp_path, status, there, why
 ):
     row = ResultRow("id", "trial", CASE, "slow", {}, 0, "source", "surface", status)
-    assert runner._changed(row, row, Store(tmp_path), [HERE | there], HERE) == why
+    assert planning.changed(row, row, Store(tmp_path), [HERE | there], HERE) == why
