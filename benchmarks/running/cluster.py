@@ -28,7 +28,7 @@ from parapoint.errors import InputError
 CONNECT_SECONDS = 30
 """Seconds that a scheduler may take to answer, and then its first worker to appear."""
 WORKER_LOST = "two workers died while they ran it; run again"
-"""Reason of a cell whose machines went away. Its method is not at fault: the next run repeats it."""
+"""Reason of a cell whose machines went away; the next run repeats it, and blames no method."""
 WORKER_GIGABYTES = 2
 """Memory in GB that a Slurm job gets on top of its cell's, for the worker and the supervisor."""
 
