@@ -74,6 +74,7 @@ def score(data: bytes) -> None:
 
 def store(data: bytes) -> None:
     """Read and check a results folder one file of which is `data` but for its first byte."""
+    from benchmarks.store import measuring, verifying
     from benchmarks.store.results import Store
 
     folder, row_id, surface_hash = _results()
@@ -85,9 +86,9 @@ def store(data: bytes) -> None:
     try:
         with contextlib.suppress(InputError):
             results = Store(folder)
-            list(results.faults())
+            list(verifying.faults(results))
             results.surface_hashes()
-            results.metrics()
+            measuring.metrics(results)
             with results.writing():
                 results.rows()
     finally:

@@ -21,7 +21,7 @@ from benchmarks.running.planning import Cell
 from benchmarks.running.runner import Progress, Summary
 
 if TYPE_CHECKING:
-    from benchmarks.store.results import ResultRow
+    from benchmarks.store.rows import ResultRow
 
 STATUSES = ("ok", "skipped", "failed", "timeout", "out_of_memory")
 BAD = STATUSES[2:]

@@ -15,7 +15,8 @@ from benchmarks.cases.suites import Suite
 from benchmarks.running import environment
 from benchmarks.running.cluster import WORKER_LOST
 from benchmarks.store.records import plain
-from benchmarks.store.results import MISSING, SOURCE_CHANGED, ResultRow, Store, identity
+from benchmarks.store.results import Store
+from benchmarks.store.rows import MISSING, SOURCE_CHANGED, ResultRow, identity
 from parapoint.errors import InputError
 from parapoint.files.reading import faults_of, read_parameterized
 from parapoint.sources import source_hash

@@ -19,7 +19,9 @@ from benchmarks.cases.suites import Suite
 from benchmarks.running import environment, executors, planning, scratch
 from benchmarks.running.planning import Cell, Chosen
 from benchmarks.running.tasks import Executor, MeasureJob, Outcome, RunJob, Task
-from benchmarks.store.results import ResultRow, Store
+from benchmarks.store import measuring
+from benchmarks.store.results import Store
+from benchmarks.store.rows import ResultRow
 
 TIME_LIMIT = 1800.0
 """Wall time in seconds that a cell may take, where the user sets no other limit."""
@@ -172,7 +174,7 @@ def _measure(
     store: Store, workers: Executor, memory: float | None, summary: Summary, progress: Progress
 ) -> None:
     """Bring the metrics up to date. Each map has a process of its own: a wild one may kill it."""
-    rows = store.unmeasured()
+    rows = measuring.unmeasured(store)
     values: dict[str, dict[str, float]] = {}
     jobs = min(workers.width, 1 + len(rows) // MAPS_PER_WORKER)
     memory_limit = _memory_limit(memory, jobs)
@@ -197,7 +199,7 @@ def _measure(
         )
         tasks.append(Task(job, began, functools.partial(ended, row)))
     workers.run(tasks, jobs)
-    store.metrics(values)
+    measuring.metrics(store, values)
 
 
 def _job(

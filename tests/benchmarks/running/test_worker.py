@@ -15,7 +15,8 @@ from benchmarks.running import cell, worker
 from benchmarks.running.environment import ROOT
 from benchmarks.running.tasks import Outcome, Prepared, Ready, RunJob, from_json, to_json
 from benchmarks.store.archives import read_map, read_surface
-from benchmarks.store.results import Store, measured
+from benchmarks.store.measuring import measured
+from benchmarks.store.results import Store
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization
 from parapoint.surfaces.surface import Mesh, PointCloud
 from parapoint.testing import sample_surfaces
