@@ -60,16 +60,16 @@ def read_as(ending: str, data: bytes) -> None:
 def score(data: bytes) -> None:
     """Score `data` as an OBJ file, or as an NPZ file where it is an archive."""
     from benchmarks.commands.score import map_state
-    from benchmarks.metrics import table as metrics
+    from benchmarks.metrics import evaluation
     from parapoint.files.reading import read_point_map
 
     path = _scratch() / ("map.npz" if data.startswith(b"PK") else "map.obj")
     path.write_bytes(data)
     with contextlib.suppress(InputError):
         if path.suffix == ".npz":
-            metrics.evaluate_points(*read_point_map(path))
+            evaluation.evaluate_points(*read_point_map(path))
         else:
-            metrics.values(map_state(path))
+            evaluation.values(map_state(path))
 
 
 def store(data: bytes) -> None:

@@ -29,7 +29,8 @@ from rich.table import Table
 from rich.text import Text
 
 from benchmarks.cases.suites import SUITES, Suite
-from benchmarks.metrics.table import METRICS, WITHOUT_SPANNING
+from benchmarks.metrics.metric import WITHOUT_SPANNING
+from benchmarks.metrics.table import METRICS
 from parapoint import console
 from parapoint.errors import InputError
 

@@ -10,7 +10,7 @@ from matplotlib import colormaps
 
 from benchmarks.metrics.distortion import FaceDistortion
 from benchmarks.metrics.seams import spanning_edges
-from benchmarks.metrics.table import MapState
+from benchmarks.metrics.state import MapState
 from benchmarks.rendering.camera import Camera, camera
 from benchmarks.rendering.colours import CLAY, FLIP_ORANGE, INK, SEAM_GREEN, Floats, Image, linear
 from benchmarks.rendering.scene import Scene, View

@@ -82,7 +82,7 @@ def main() -> None:
     while line := jobs.readline():
         job = from_json(line, RunJob, MeasureJob)
         if isinstance(job, MeasureJob):
-            importlib.import_module("benchmarks.metrics.table")  # once, before the forks
+            importlib.import_module("benchmarks.metrics.evaluation")  # once, before the forks
         outcome = _supervised(job, wake, [reply, wake, waker, jobs.fileno()])
         os.write(reply, to_json(outcome))
 

@@ -92,12 +92,12 @@ def measured(
     Raises:
         InputError: the map is not one of this surface.
     """
-    from benchmarks.metrics import table
+    from benchmarks.metrics import evaluation
 
     if isinstance(surface, Mesh) and isinstance(result, Parameterization):
-        return table.evaluate(surface, result, reference)
+        return evaluation.evaluate(surface, result, reference)
     if isinstance(surface, PointCloud) and isinstance(result, PointParameterization):
-        return table.evaluate_points(surface, result)
+        return evaluation.evaluate_points(surface, result)
     raise InputError("a map of a mesh for a point cloud, or the other way round")
 
 
@@ -115,7 +115,7 @@ def row_metrics(store: Store, row: ResultRow) -> dict[str, float]:
 
 def metrics_keys(store: Store, rows: Sequence[ResultRow]) -> dict[str, str]:
     """By row id, a hash of all that a row's metrics depend on: map, references, their source."""
-    source = source_hash("benchmarks.metrics.table")
+    source = source_hash("benchmarks.metrics.evaluation")
     references = {path.stem for path in (store.folder / "references").glob("*.npz")}
     exact = {path.stem for path in (store.folder / "exact").glob("*.npz")}
     texts = {

@@ -21,7 +21,7 @@ from baselines import registry
 from benchmarks.cases import models
 from benchmarks.cases.suites import Suite
 from benchmarks.checks import endurance
-from benchmarks.metrics.table import evaluate_points
+from benchmarks.metrics.evaluation import evaluate_points
 from benchmarks.running import cell, environment, executors, planning, runner, scratch
 from benchmarks.running.runner import Summary, run
 from benchmarks.store import measuring, verifying
