@@ -159,13 +159,14 @@ def list_(what: str) -> None:
 @click.pass_context
 def check(ctx: click.Context, folder: Path) -> None:
     """Verify every row of a results folder against its files, and a sample of its metrics."""
+    from benchmarks.store import verifying
     from benchmarks.store.results import Store
 
     if not (folder / "runs.jsonl").is_file():
         raise InputError(f"{folder} is no results folder: it has no runs.jsonl")
     store = Store(folder)
     faults = 0
-    for fault in store.faults():
+    for fault in verifying.faults(store):
         faults += 1
         print(fault)
     rows = store.rows()

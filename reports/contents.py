@@ -16,7 +16,9 @@ import pandas as pd
 
 from benchmarks.cases.suites import SUITES
 from benchmarks.metrics.table import METRICS
-from benchmarks.store.results import ResultRow, Store
+from benchmarks.store import measuring
+from benchmarks.store.results import Store
+from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh, PointCloud
@@ -342,7 +344,7 @@ def contents(folder: Path) -> list[Contents]:
             f"{folder} holds no results: it has no readable line in runs.jsonl; "
             "`python -m benchmarks run` writes them"
         )
-    frame = store.metrics()
+    frame = measuring.metrics(store)
     is_large = len({row.case for row in rows}) > SHEETS
     found = []
     for suite in dict.fromkeys(row.suite for row in rows):

@@ -16,7 +16,7 @@ from scipy import stats
 
 from benchmarks.checks import regress
 from benchmarks.metrics.table import METRICS
-from benchmarks.store.results import ResultRow
+from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
 from reports.contents import Contents, contents
 from reports.pictures.drawing import slug

@@ -17,10 +17,11 @@ from rich.progress import Progress as Bar
 from rich.table import Table
 from rich.text import Text
 
-from benchmarks.running.runner import Cell, Progress, Summary
+from benchmarks.running.planning import Cell
+from benchmarks.running.runner import Progress, Summary
 
 if TYPE_CHECKING:
-    from benchmarks.store.results import ResultRow
+    from benchmarks.store.rows import ResultRow
 
 STATUSES = ("ok", "skipped", "failed", "timeout", "out_of_memory")
 BAD = STATUSES[2:]

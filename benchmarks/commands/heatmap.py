@@ -12,7 +12,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import Colormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 
-from benchmarks.metrics.table import MapState
+from benchmarks.metrics.state import MapState
 from parapoint.errors import InputError
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 

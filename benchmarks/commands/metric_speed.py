@@ -17,7 +17,7 @@ import numpy as np
 from rich.table import Table
 
 from benchmarks.cases.builtin import grid_faces
-from benchmarks.metrics.table import evaluate
+from benchmarks.metrics.evaluation import evaluate
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh
 

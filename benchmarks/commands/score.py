@@ -12,9 +12,11 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from benchmarks.metrics import table as metrics
+from benchmarks.metrics import evaluation
 from benchmarks.metrics.grades import BOUNDS, grade
-from benchmarks.metrics.table import GROUPS, METRICS, WITHOUT_SPANNING, MapState
+from benchmarks.metrics.metric import GROUPS, WITHOUT_SPANNING
+from benchmarks.metrics.state import MapState
+from benchmarks.metrics.table import METRICS
 from parapoint.errors import InputError
 from parapoint.files.reading import faults_of, has_faces, read_parameterized, read_point_map
 from parapoint.surfaces.parameterization import Parameterization
@@ -48,12 +50,12 @@ def score(file: Path, *, reference: Path | None, as_json: bool, heatmap: Path | 
             raise InputError(f"{file}: --reference and --heatmap need a mesh, not a point cloud")
         cloud, image = read_point_map(file)
         with faults_of(file):
-            values = metrics.evaluate_points(cloud, image)
+            values = evaluation.evaluate_points(cloud, image)
         title = f"{file}: {len(cloud.points):,} points"
         state = None
     else:
         state = map_state(file, reference)
-        values = metrics.values(state)
+        values = evaluation.values(state)
         title = f"{file}: {summary(state)}"
         if heatmap is not None:
             from benchmarks.commands.heatmap import write_heatmap

@@ -37,7 +37,7 @@ BOUNDS = (
 
 
 def grade(values: Mapping[str, float], *, of_cloud: bool) -> Grade:
-    """The grade of a map with these metrics (`benchmarks.metrics.table.evaluate` and `_points`).
+    """The grade of a map whose metrics (`benchmarks.metrics.evaluation`) are given.
 
     Args:
         values: metrics by name.

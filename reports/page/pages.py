@@ -18,7 +18,7 @@ from matplotlib import colormaps
 from matplotlib.colors import to_hex
 from PIL import Image
 
-from benchmarks.store.results import ResultRow
+from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
 from parapoint.surfaces.surface import Mesh
 from reports.contents import AREA, Contents, Label, number, suite_title

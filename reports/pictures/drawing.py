@@ -23,8 +23,9 @@ from PIL import Image as Images
 
 from benchmarks.metrics.distortion import FaceDistortion
 from benchmarks.metrics.seams import spanning_edges
-from benchmarks.metrics.table import MapState
-from benchmarks.store.results import ResultRow, Store
+from benchmarks.metrics.state import MapState
+from benchmarks.store.results import Store
+from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
 from parapoint.sources import source_hash
 from parapoint.surfaces.parameterization import Parameterization

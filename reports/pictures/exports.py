@@ -12,7 +12,7 @@ import numpy.typing as npt
 import trimesh
 from PIL import Image
 
-from benchmarks.store.results import ResultRow
+from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
 from parapoint.files.mesh_writers import write_obj
 from parapoint.files.targets import complete_file

@@ -23,7 +23,7 @@ from matplotlib.image import AxesImage
 from PIL import Image as Images
 from pypdf import PdfWriter
 
-from benchmarks.store.results import ResultRow
+from benchmarks.store.rows import ResultRow
 from parapoint.sources import source_hash
 from reports.contents import SHEETS, Contents
 from reports.pictures.clouds import DENSE, SPARSE

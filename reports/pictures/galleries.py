@@ -10,7 +10,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from benchmarks.store.results import ResultRow
+from benchmarks.store.rows import ResultRow
 from parapoint.surfaces.preparation import CUT
 from reports.contents import (
     ANGLE,

@@ -14,7 +14,7 @@ from benchmarks.metrics.distortion import (
     face_distortion,
     triangles,
 )
-from benchmarks.store.results import ResultRow
+from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from benchmarks.metrics.table import GROUPS, METRICS
+from benchmarks.metrics.metric import GROUPS
+from benchmarks.metrics.table import METRICS
 from reports.contents import (
     ANGLE,
     AREA,

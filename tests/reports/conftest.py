@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from benchmarks.store.archives import arrays_hash, map_arrays, trace_arrays, write_arrays
-from benchmarks.store.results import ResultRow, Store, identity
+from benchmarks.store.results import Store
+from benchmarks.store.rows import ResultRow, identity
 from parapoint.surfaces.parameterization import Parameterization, TracePoint
 from parapoint.surfaces.surface import Mesh
 from reports.pictures import clouds, render, style

@@ -10,8 +10,10 @@ from PIL import Image
 
 from benchmarks.__main__ import main
 from benchmarks.commands.score import json_values, map_state, number, same_faces, worst_faces
+from benchmarks.metrics.evaluation import evaluate
 from benchmarks.metrics.grades import GRADES
-from benchmarks.metrics.table import METRICS, MapState, evaluate
+from benchmarks.metrics.state import MapState
+from benchmarks.metrics.table import METRICS
 from parapoint import Mesh, console
 from parapoint.files.reading import read_parameterized
 
