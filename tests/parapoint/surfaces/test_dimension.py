@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from parapoint import ComputedMap
 from parapoint.errors import InputError
+from parapoint.files.reading import read_surface
 from parapoint.surfaces.dimension import dimensions
 from parapoint.surfaces.surface import FloatArray, Mesh
 from parapoint.testing import irregular_disk
@@ -118,3 +120,12 @@ def test_what_no_number_can_say_is_one_line() -> None:
     """Points at both ends of float64, whose distance is beyond it."""
     with pytest.raises(InputError, match="farther apart than a number can say"):
         ComputedMap().fit(1.7e308 * sphere(200))
+
+
+@pytest.mark.parametrize("size", ["1e-320", "1e-200", "1e-90", "1e90", "1e200", "1.7e308"])
+def test_a_mesh_whose_areas_no_number_can_say_is_one_line(size: str, tmp_path: Path) -> None:
+    """Every command reads it by the same function."""
+    path = tmp_path / "mesh.off"
+    path.write_text(f"OFF\n3 1 0\n-{size} 0 0\n{size} 0 0\n0 {size} 0\n3 0 1 2\n")
+    with pytest.raises(InputError, match=r"mesh\.off: its size is .* scale it to between"):
+        read_surface(path)
