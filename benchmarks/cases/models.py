@@ -69,14 +69,12 @@ class Model:
         name: canonical name, the file's without its ending.
         file: path under a mirror or the cache.
         set: the folder: paper, disk, closed, genus, cad, wild, scans or artist.
-        kind: "mesh" or "point cloud".
         url: where it is downloaded from, at a commit.
         sha256: hash of the file.
         size: bytes.
         licence: what its source says about it.
         source: repository, commit and path.
         note: what is special about it.
-        tags: words to select by.
         vertices: number of vertices, or of points.
         faces: number of triangles.
         topology: as `Mesh.topology` says it, or "point cloud".
@@ -89,14 +87,12 @@ class Model:
     name: str
     file: str
     set: str
-    kind: Literal["mesh", "point cloud"]
     url: str
     sha256: str
     size: int
     licence: str
     source: str
     note: str
-    tags: tuple[str, ...]
     vertices: int
     faces: int
     topology: str
@@ -128,7 +124,7 @@ def _data(name: str) -> Any:
 @cache
 def registry() -> dict[str, Model]:
     """All models by canonical name, in the order of the sets."""
-    entries = [Model(**{**entry, "tags": tuple(entry["tags"])}) for entry in _data("models.json")]
+    entries = [Model(**entry) for entry in _data("models.json")]
     return {model.name: model for model in entries}
 
 
