@@ -229,7 +229,7 @@ def _mesh(content: Content) -> tuple[Mesh, IntArray]:
     size = float(np.ptp(vertices / 2, axis=0).max(initial=0)) * 2
     if size and not SMALLEST_MESH < size < LARGEST_MESH:
         raise InputError(
-            f"its size is {size:g}, and areas of this size are beyond a float64: scale it to between "
+            f"its size is {size:g}, and areas of it are beyond a float64: scale it to between "
             f"{SMALLEST_MESH:g} and {LARGEST_MESH:g}"
         )
     outside = (content.corners < 0) | (content.corners >= len(vertices))
