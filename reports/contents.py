@@ -30,6 +30,7 @@ WORST_PART = "part_area_ratio_min_without_spanning"
 SHEETS = 12
 """Most models of a report in which each has figures of its own, and all pictures for them."""
 ISOMETRIC = "symmetric_dirichlet"
+OVERLAPPED, BIJECTIVE = "overlapped_fraction", "bijective"
 POINT_ANGLE, POINT_AREA = "local_quasi_conformal_mean", "local_area_log_ratio_mean"
 POINT_COLLISIONS, POINT_TEARS = "uv_collision_fraction", "spanning_point_fraction"
 

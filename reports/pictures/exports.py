@@ -21,7 +21,8 @@ from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh
 from parapoint.textures.checkerboard import checkerboard
 from reports.contents import Contents
-from reports.pictures.drawing import known_keys, slug
+from reports.pictures.drawing import known_keys
+from reports.pictures.names import slug
 
 KINDS = ("obj", "glb")
 

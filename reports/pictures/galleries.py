@@ -10,6 +10,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
+from benchmarks.rendering.maps import ANGLE_SCALE, AREA_SCALE
 from benchmarks.store.rows import ResultRow
 from parapoint.surfaces.preparation import CUT
 from reports.contents import (
@@ -23,14 +24,7 @@ from reports.contents import (
     Contents,
     Label,
 )
-from reports.pictures.drawing import (
-    ANGLE_SCALE,
-    AREA_SCALE,
-    ARTIST_PICTURES,
-    CLOUD_PICTURES,
-    map_file,
-    model_file,
-)
+from reports.pictures.names import ARTIST_PICTURES, CLOUD_PICTURES, map_file, model_file
 from reports.pictures.style import WIDTH, figure, picture_grid, put, wrapped
 
 

@@ -24,7 +24,7 @@ from reports.contents import (
     Contents,
     Label,
 )
-from reports.pictures.drawing import slug
+from reports.pictures.names import slug
 from reports.ranking import is_of_angles, may_rank
 from reports.tables.table import metric_column
 

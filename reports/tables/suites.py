@@ -20,17 +20,12 @@ from reports.contents import (
     number,
 )
 from reports.ranking import may_rank
+from reports.tables.kinds import means_by_kind, success
 from reports.tables.notes import environment_note, failure_notes, grade_notes, legend, method_notes
 from reports.tables.published import AUTHORS, Verdict, claim_text, published_values, verdicts
-from reports.tables.studies import (
-    ablation,
-    cuts,
-    means_by_kind,
-    paired_tests,
-    seed_variance,
-    success,
-)
+from reports.tables.statistics import paired_tests, seed_variance
 from reports.tables.table import Column, Table, Value, metric_column, metric_title
+from reports.tables.variants import ablation, cuts
 
 MOST_LEFT_OUT = 0.1
 """Share of a method's maps that may be unfit for a rank before its means take no part in ranks."""

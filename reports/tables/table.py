@@ -9,6 +9,18 @@ from functools import cached_property
 from typing import Literal, NamedTuple
 
 from benchmarks.metrics.table import METRICS
+from reports.contents import (
+    ANGLE,
+    AREA,
+    FLIPPED,
+    ISOMETRIC,
+    OVERLAPPED,
+    POINT_ANGLE,
+    POINT_AREA,
+    POINT_COLLISIONS,
+    POINT_TEARS,
+    SPANNING,
+)
 from reports.ranking import is_of_angles, may_rank, ranks
 
 Value = float | str | None
@@ -16,6 +28,21 @@ Mark = Literal["", "best", "second"]
 
 MARKS: dict[int | None, Mark] = {1: "best", 2: "second"}
 ARROWS = {"lower": "↓", "higher": "↑"}
+
+SHORT = {
+    ANGLE: "angle [rad]",
+    AREA: "area [0–2]",
+    ISOMETRIC: "sym. Dirichlet",
+    FLIPPED: "flipped %",
+    OVERLAPPED: "overlapped %",
+    SPANNING: "spanning %",
+    POINT_ANGLE: "stretch",
+    POINT_AREA: "area",
+    POINT_COLLISIONS: "collisions %",
+    POINT_TEARS: "tears %",
+    "seam_excess": "seam − artist's",
+}
+"""Heads of metrics in tables that show many of them."""
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,7 @@ DEPENDENCIES = {
     "parapoint/learned/losses.py": "parapoint.learned.parapoint",
     "parapoint/computed/scale.py": "parapoint.unwrapping.unwrap",
     "parapoint/unwrapping/tutte.py": "baselines.disks.slim",
-    "reports/pictures/render.py": "reports.pictures.drawing",
+    "benchmarks/rendering/scene.py": "reports.pictures.drawing",
 }
 """Files, and a module that depends on each."""
 
