@@ -10,6 +10,9 @@ DASH = "–"
 LARGE = 1e5
 """Numbers from here on are printed with a power of ten."""
 
+SIGNIFICANT = 6
+"""Most digits of a number: of a larger one fewer stand after the point."""
+
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -30,4 +33,5 @@ def printed(value: float | None, digits: int, *, percent: bool = False) -> str:
         mantissa, exponent = f"{number:.1e}".split("e")
         power = str(int(exponent)).translate(_SUPERSCRIPTS)
         return f"{mantissa}·10{power}".replace("-", "−")
-    return f"{number:,.{digits}f}".replace("-", "−")
+    before = len(f"{abs(number):.0f}")
+    return f"{number:,.{min(digits, max(SIGNIFICANT - before, 0))}f}".replace("-", "−")

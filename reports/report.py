@@ -6,6 +6,7 @@ from pathlib import Path
 
 from reports.contents import contents
 from reports.page import pages as page
+from reports.page.sections import Section
 from reports.pictures import drawing as pictures
 from reports.pictures import exports, figures
 from reports.pictures.names import slug
@@ -35,5 +36,5 @@ def write(folder: Path, *, jobs: int, textured: bool = False) -> Path:
         drawn = figures.draw(suite, drawn_in / "pictures", drawn_in, jobs)
         if textured:
             faults += exports.write(suite, report)
-        sections.append(page.Section(report, suite, made, drawn, faults))
+        sections.append(Section(report, suite, made, drawn, faults))
     return page.write(report, folder, sections)

@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 from benchmarks.metrics.pointwise import PointMap, point_map
 from benchmarks.rendering.colours import (
     DARK_TONE,
+    FLIP_ORANGE,
     LIGHT_TONE,
     SEAM_GREEN,
     Floats,
@@ -23,14 +24,21 @@ from benchmarks.rendering.colours import (
     averaged,
     linear,
 )
+from benchmarks.rendering.maps import Map
 from benchmarks.rendering.scene import Scene, View
 from benchmarks.rendering.viewpoints import two_cameras
+from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import PointParameterization
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh, PointCloud
 
 SPARSE, DENSE = 10_000, 250_000
-"""Points of the paper's input, and of its texture mapping."""
+"""Points of the paper's input, drawn where a row does not say how many it had, and of its texture
+mapping.
+"""
+
+MOST_POINTS = 50_000
+"""Most points that are drawn of a cloud: more run into one another."""
 
 GREY = linear([0.62, 0.62, 0.62])
 
@@ -78,17 +86,24 @@ def surface_points(mesh: Mesh, count: int) -> Points:
     return Points(mesh, np.minimum(face, len(mesh.faces) - 1), weights)
 
 
-def images(
-    view: View, uv: FloatArray, spanning: BoolArray, colours: Floats, squares: float
-) -> Mapping[str, Image]:
-    """The pictures by their kind.
+def points_used(row: ResultRow) -> int:
+    """How many points the method of a row was given."""
+    told = row.report.get("points", row.params.get("points"))
+    return min(told, MOST_POINTS) if isinstance(told, int) and told > 0 else SPARSE
 
-    `uv` (F, 3, 2) at the corners, `spanning` (F,), `colours` (F, 3, 3) by normals, `squares` fields
-    of the checkerboard to a unit of uv.
+
+def images(
+    view: View, found: Map, colours: Floats, squares: float, count: int
+) -> Mapping[str, Image]:
+    """The pictures of a map of a mesh by their kind.
+
+    `colours` (F, 3, 3) of the corners by normals, `squares` fields of the checkerboard to a unit of
+    uv, `count` points of the cloud.
     """
-    mesh = view.scene.mesh
-    sparse, dense = surface_points(mesh, SPARSE), surface_points(mesh, DENSE)
-    spacing = float(np.sqrt(mesh.face_areas.sum() / SPARSE))
+    mesh, spanning = view.scene.mesh, found.spanning
+    uv = found.uv - found.uv.min(axis=(0, 1))
+    sparse, dense = surface_points(mesh, count), surface_points(mesh, DENSE)
+    spacing = float(np.sqrt(mesh.face_areas.sum() / count))
     seen = view.at_corners(mesh.vertices[mesh.faces])
     reach = DOT * spacing
     distance, nearest = cKDTree(sparse.positions).query(
@@ -99,6 +114,7 @@ def images(
     _, densely = cKDTree(dense.positions).query(seen, workers=-1)
     field = np.floor(dense.uv(uv, spanning) * squares).sum(axis=1) % 2 == 0
     checker = np.where(field[:, None], LIGHT_TONE, DARK_TONE)
+    checker[found.flipped[dense.face]] = FLIP_ORANGE
     return {
         "cloud": _part(view, dots).image(tones[nearest[dots]], lit=False),
         "cloud-uv": _planar(sparse.uv(uv, spanning), tones, view),

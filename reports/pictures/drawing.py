@@ -173,7 +173,12 @@ def draw_model(
         try:
             result = store.result(row)
             kinds = map_kinds(row, points=points, with_heat=with_heat)
-            for kind, content in subject.map(result, kinds).items():
+            of_map = (
+                subject.map(result, kinds, clouds.points_used(row))
+                if isinstance(subject, Portrait)
+                else subject.map(result, kinds)
+            )
+            for kind, content in of_map.items():
                 save(content, folder / map_file(row, kind))
         except InputError as error:
             failed += files_of(row, points)

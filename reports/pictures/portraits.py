@@ -52,8 +52,10 @@ class Portrait:
         sky = self._scene.coarse_openness
         return made | {VIEWED: viewer.shape(self.mesh, self._views[0].camera, sky)}
 
-    def map(self, result: object, kinds: Sequence[str]) -> Mapping[str, Content]:
-        """The files of a map by their kind, those of `kinds`.
+    def map(
+        self, result: object, kinds: Sequence[str], points: int = clouds.SPARSE
+    ) -> Mapping[str, Content]:
+        """The files of a map by their kind, those of `kinds`; a cloud is drawn of `points`.
 
         Raises:
             InputError: the map is not of this mesh, or there is nothing to see.
@@ -79,9 +81,9 @@ class Portrait:
         }
         made = {kind: makers[kind]() for kind in kinds if kind in makers}
         if CLOUD_PICTURES[0] in kinds:
-            uv = found.uv - found.uv.min(axis=(0, 1))
-            squares = FIELDS / self._scene.size
-            made |= clouds.images(first, uv, found.spanning, colours, squares)
+            # From the side that shows more of the flips, if there are any.
+            view = max(self._views, key=lambda one: int(found.flipped[one.face].sum()))
+            made |= clouds.images(view, found, colours, FIELDS / self._scene.size, points)
         return made
 
 

@@ -192,8 +192,8 @@ def _full(row: Mapping[str, Value], column: Column) -> Value:
 
 _CSS = """
 :root { color-scheme: light dark }
-body { font: 16px/1.45 Charter, Palatino, Georgia, serif; margin: 2rem auto; max-width: 84rem;
-  padding: 0 1.5rem }
+body { font: 15px/1.5 system-ui, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif;
+  margin: 2rem auto; max-width: 84rem; padding: 0 1.5rem }
 .scroll { overflow-x: auto }
 table { border-collapse: collapse; border-block: 1.5px solid; font-variant-numeric: tabular-nums }
 tbody { border-top: 1px solid }

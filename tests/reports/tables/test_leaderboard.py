@@ -10,7 +10,8 @@ from reports.contents import (
     POINT_TEARS,
     contents,
 )
-from reports.tables.leaderboard import SHOWN, data, definition, glances, winner
+from reports.page.board import data
+from reports.tables.leaderboard import SHOWN, definition, glances, winner
 from reports.tables.suites import comparison
 
 from ..conftest import DEVIL, HAND, HOSTILE, NEFERTITI, Writer, flat, sheet
