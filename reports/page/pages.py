@@ -305,7 +305,7 @@ class Section:
         """The environments in which the cells ran, entry by entry."""
         used = {row.run for row in self.contents.rows}
         try:
-            entries = self.contents.store.environment()["runs"]
+            entries = self.contents.runs
         except InputError:
             return []
         return [
