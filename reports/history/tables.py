@@ -16,7 +16,7 @@ from reports.history.comparison import (
     Group,
     Key,
 )
-from reports.tables.table import Column, Table, Value, metric_title
+from reports.tables.table import Column, Table, Value, metric_column
 
 
 def summary(found: Comparison) -> Table:
@@ -115,7 +115,7 @@ def moved(found: Comparison) -> Table | None:
         blocks.setdefault(move.key, []).append(
             {
                 **_named(found, move.key),
-                "metric": metric_title(move.name).removesuffix(" %"),
+                "metric": metric_column(move.name).title,
                 "before": move.before,
                 "after": move.after,
                 "change": move.after - move.before,

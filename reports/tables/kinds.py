@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-import numpy as np
-
 from benchmarks.metrics.grades import BOUNDS
 from reports.contents import (
     ANGLE,
@@ -21,6 +17,7 @@ from reports.contents import (
     Contents,
     number,
 )
+from reports.means import common_cases, common_values, statistic
 from reports.tables.notes import environment_note, failure_notes, legend, method_notes
 from reports.tables.published import model
 from reports.tables.table import SHORT, Column, Table, Value, metric_column
@@ -122,10 +119,8 @@ def means_by_kind(contents: Contents) -> Table:
                 "done": _share(sum(record["ok"] > 0 for record in own), len(own)),
             }
             for metric in names:
-                values = [number(found[case], metric) for case in common]
-                known = [value for value in values if value is not None]
-                if known and len(known) == len(common):
-                    row[metric] = float(np.mean(known))
+                values = common_values(contents, label, metric, common)
+                row[metric] = statistic("mean", values, metric_column(metric).better)
             block.append(row)
         blocks.append(tuple(block))
     return Table(
@@ -145,14 +140,3 @@ def means_by_kind(contents: Contents) -> Table:
         set_apart=contents.atlases,
         notes=(legend(contents), *method_notes(contents), environment_note(contents)),
     )
-
-
-def common_cases(contents: Contents, cases: Sequence[str]) -> list[str]:
-    """Those of `cases` on which every method that ends well on any of them does."""
-    good = {key for key, record in contents.records.items() if record["ok"] > 0}
-    able = [
-        label.short
-        for label in contents.methods
-        if any((case, label.short) in good for case in cases)
-    ]
-    return [case for case in cases if able and all((case, short) in good for short in able)]
