@@ -23,7 +23,7 @@ def components(surface: Surface) -> list[Surface]:
     """The components of a surface, largest first (a mesh's by area, a cloud's by points).
 
     Of a mesh: faces that share vertices, left out where they have no area. Of a cloud: connected
-    components of the graph that joins each point to its NEIGHBOURS nearest, and to the next scan line.
+    components of the graph that joins each point to its NEIGHBOURS nearest and the next scan line.
     """
     if isinstance(surface, Mesh):
         label = surface.face_components

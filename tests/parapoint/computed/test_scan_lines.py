@@ -1,4 +1,4 @@
-"""Clouds scanned in lines and rings, up to thirty times as far apart as their points, are mapped."""
+"""Clouds scanned in lines and rings are mapped, up to thirty times as far apart as their points."""
 
 from collections.abc import Callable
 
@@ -86,7 +86,7 @@ def test_lines_farther_apart_are_refused_with_advice() -> None:
 def test_lines_are_one_component() -> None:
     """Two sheets of lines are two."""
     sheet = strips(20, 2000)
-    both = np.concatenate([sheet, sheet + [0, 0, 2000.0]])
+    both = np.concatenate([sheet, sheet + np.array([0, 0, 2000.0])])
     np.testing.assert_array_equal(cloud_labels(both), np.arange(4000) >= 2000)
 
 
@@ -97,7 +97,7 @@ def test_neighbourhoods_grow_on_lines_alone() -> None:
     assert (count >= 20).all()
     grid = np.stack(np.meshgrid(np.arange(20.0), np.arange(20.0), [0.0]), axis=-1).reshape(-1, 3)
     assert breadth(grid) is None
-    mixed = np.concatenate([grid, strips(20) + [0, 100, 0]])
+    mixed = np.concatenate([grid, strips(20) + np.array([0, 100, 0])])
     found = breadth(mixed)
     assert found is not None
     assert (found[:400] == NEAREST).mean() > 0.9
