@@ -69,7 +69,6 @@ class Description:
     """A method in words.
 
     Attributes:
-        name: its name in the registry.
         summary: first line of its docstring.
         requires: what a surface must be, words of `parapoint.method.REQUIREMENTS`, sorted.
         parameters: its fields and their defaults, as source text; "" for none.
@@ -77,7 +76,6 @@ class Description:
             parameters".
     """
 
-    name: str
     summary: str
     requires: tuple[str, ...]
     parameters: dict[str, str]
@@ -161,7 +159,7 @@ def describe(name: str) -> Description:
     summary = (kind.__doc__ or "").strip().split("\n", maxsplit=1)[0]
     promise = {True: "yes", False: "no"}.get(getattr(kind, "deterministic", True))
     return Description(
-        name, summary, tuple(sorted(kind.requires)), parameters, promise or "by its parameters"
+        summary, tuple(sorted(kind.requires)), parameters, promise or "by its parameters"
     )
 
 

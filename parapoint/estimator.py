@@ -17,6 +17,7 @@ from parapoint import fitting, saving
 from parapoint.errors import InputError
 from parapoint.fitting import COMPONENTS, Fitted, Progress, Session, SurfaceMap
 from parapoint.parameters import check_choice, check_number, check_whole
+from parapoint.surfaces.dimension import checked_dimension
 from parapoint.surfaces.frame import Frame
 from parapoint.surfaces.gridding import gridded
 from parapoint.surfaces.parameterization import (
@@ -122,7 +123,8 @@ class Estimator(ABC):
 
         Raises:
             InputError: a parameter is not as said, there are fewer than 100 distinct points, or
-                they lie on a line; the checkpoint is of another run or version.
+                they lie along a curve, or farther apart than a number can say; the checkpoint is of
+                another run or version.
             RuntimeError: the strategy failed: `ReconstructionError` of `ComputedMap`,
                 `DivergedError` of `ParaPoint`.
         """
@@ -135,8 +137,9 @@ class Estimator(ABC):
     def _fit(self, points: npt.ArrayLike | Surface, session: Session) -> Self:
         self.check()
         surface, strays = without_strays(surface_of(points))
+        shape = checked_dimension(surface)
         fitted = fitting.fitted(self.fit_part, surface, self.components, session)
-        fitted.report.update(strays)
+        fitted.report.update(strays | shape)
         return self._take(fitted)
 
     def _take(self, fitted: Fitted) -> Self:

@@ -17,6 +17,13 @@ from parapoint.surfaces.preparation import prepared
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, PointCloud, Surface
 
 SEED = 7
+"""Seed of the methods and of the surfaces that they are checked on."""
+THINNEST = 1e-9
+"""Ratio of a map's width to its length up to which it counts as collapsed to a line."""
+
+
+class BrokenPromiseError(AssertionError):
+    """A method breaks a promise of the protocol; the message says which, and on which surface."""
 
 
 def check_method(method: Method, surface: Surface | None = None) -> None:
@@ -37,7 +44,7 @@ def check_method(method: Method, surface: Surface | None = None) -> None:
         surface: one surface to check it on, in place of the tiny ones; an unsupported one is fine.
 
     Raises:
-        AssertionError: a promise is broken; the message says which, and on which surface.
+        BrokenPromiseError: a promise is broken; the message says which, and on which surface.
         MissingError: a package or program that the method needs is not there.
         UnsupportedError: nothing could be checked, as the method refuses every surface.
     """
@@ -64,7 +71,7 @@ def check_method(method: Method, surface: Surface | None = None) -> None:
         except UnsupportedError as error:
             refusal = error
             if checked:
-                raise AssertionError(f"{where}: refused, though it meets `requires`") from error
+                raise BrokenPromiseError(f"{where}: refused, though it meets `requires`") from error
             continue
         checked += 1
     if not checked and refusal is not None:
@@ -138,18 +145,19 @@ def defective() -> Mesh:
 
 def _check_declaration(method: Method, name: str) -> None:
     """The class is as the protocol says."""
-    assert is_dataclass(method), f"{name}: is no dataclass"
-    assert not isinstance(method, type), f"{name}: give a method, not its class"
-    assert isinstance(method.requires, frozenset), f"{name}: requires is no frozenset"
+    _promise(is_dataclass(method), f"{name}: is no dataclass")
+    _promise(not isinstance(method, type), f"{name}: give a method, not its class")
+    _promise(isinstance(method.requires, frozenset), f"{name}: requires is no frozenset")
     unknown = sorted(method.requires - REQUIREMENTS.keys())
-    assert not unknown, f"{name}: requires unknown words {unknown}; known: {sorted(REQUIREMENTS)}"
+    known = sorted(REQUIREMENTS)
+    _promise(not unknown, f"{name}: requires unknown words {unknown}; known: {known}")
     parameters = asdict(cast("Any", method))
     _check_json(parameters, f"{name}: its parameters")
     try:
         copy = pickle.loads(pickle.dumps(method))  # noqa: S301 (our own bytes)
     except Exception as error:
-        raise AssertionError(f"{name}: cannot be pickled: {error}") from error
-    assert asdict(copy) == parameters, f"{name}: pickling changes its parameters"
+        raise BrokenPromiseError(f"{name}: cannot be pickled: {error}") from error
+    _promise(asdict(copy) == parameters, f"{name}: pickling changes its parameters")
 
 
 def _check_json(value: object, what: str) -> None:
@@ -157,7 +165,7 @@ def _check_json(value: object, what: str) -> None:
     try:
         json.dumps(value)
     except (TypeError, ValueError) as error:
-        raise AssertionError(f"{what} cannot be written as JSON: {error}") from error
+        raise BrokenPromiseError(f"{what} cannot be written as JSON: {error}") from error
 
 
 def _check_refusal(method: Method, surface: Surface, where: str) -> None:
@@ -166,7 +174,7 @@ def _check_refusal(method: Method, surface: Surface, where: str) -> None:
         method.parameterize(surface, seed=SEED)
     except Exception:  # noqa: BLE001 (any error is a refusal; only silence is not)
         return
-    raise AssertionError(f"{where}: returned a map, though `requires` refuses this surface")
+    raise BrokenPromiseError(f"{where}: returned a map, though `requires` refuses this surface")
 
 
 def _check_run(
@@ -176,20 +184,26 @@ def _check_run(
     before = _arrays(surface)
     result = method.parameterize(surface, seed=SEED)
     for name, array in _arrays(surface).items():
-        assert np.array_equal(array, before[name]), f"{where}: changed the surface's {name}"
+        _promise(np.array_equal(array, before[name]), f"{where}: changed the surface's {name}")
     if isinstance(surface, Mesh):
-        assert isinstance(result, Parameterization), (
-            f"{where}: returned {type(result).__name__}; a mesh needs a Parameterization"
-        )
+        if not isinstance(result, Parameterization):
+            returned = type(result).__name__
+            raise BrokenPromiseError(
+                f"{where}: returned {returned}; a mesh needs a Parameterization"
+            )
         _check_corners(surface, result, where)
     else:
-        assert isinstance(result, PointParameterization), (
-            f"{where}: returned {type(result).__name__}; a cloud needs a PointParameterization"
-        )
+        if not isinstance(result, PointParameterization):
+            returned = type(result).__name__
+            raise BrokenPromiseError(
+                f"{where}: returned {returned}; a cloud needs a PointParameterization"
+            )
         shape = (len(surface.points), 2)
-        assert result.uv.shape == shape, f"{where}: uv has shape {result.uv.shape}, not {shape}"
+        found = result.uv.shape
+        _promise(found == shape, f"{where}: uv has shape {found}, not {shape}")
     spread = np.linalg.svd(result.uv - result.uv.mean(axis=0), compute_uv=False)
-    assert spread[1] > 1e-9 * spread[0], f"{where}: the map collapsed to a line or a point"
+    wide = bool(spread[1] > THINNEST * spread[0])
+    _promise(wide, f"{where}: the map collapsed to a line or a point")
     _check_trace(result, where)
     _check_json(dict(result.report), f"{where}: the report")
     return result
@@ -208,16 +222,16 @@ def _arrays(surface: Surface) -> dict[str, FloatArray | IntArray]:
 def _check_corners(mesh: Mesh, result: Parameterization, where: str) -> None:
     """One row of corners a face, and no row of uv for two places of the surface."""
     shape = mesh.faces.shape
-    assert result.corners.shape == shape, (
-        f"{where}: corners have shape {result.corners.shape}, the faces {shape}"
-    )
+    found = result.corners.shape
+    _promise(found == shape, f"{where}: corners have shape {found}, the faces {shape}")
     place = mesh.vertices[mesh.faces].reshape(-1, 3)
     row = result.corners.reshape(-1)
     last = np.zeros((len(result.uv), 3))
     last[row] = place
-    assert np.array_equal(last[row], place), (
+    _promise(
+        np.array_equal(last[row], place),
         f"{where}: a row of uv serves corners at different places: "
-        "faces or corners are not in the order of the mesh"
+        "faces or corners are not in the order of the mesh",
     )
 
 
@@ -227,11 +241,12 @@ def _check_trace(result: Parameterization | PointParameterization, where: str) -
         ("iterations", [point.iteration for point in result.trace]),
         ("seconds", [point.seconds for point in result.trace]),
     ):
-        assert values == sorted(values), f"{where}: the {name} of the trace go back"
+        _promise(values == sorted(values), f"{where}: the {name} of the trace go back")
     for point in result.trace:
         if point.uv is not None:
             fits = point.uv.shape == result.uv.shape and np.isfinite(point.uv).all()
-            assert fits, f"{where}: the map at iteration {point.iteration} of the trace is not one"
+            which = f"the map at iteration {point.iteration} of the trace"
+            _promise(bool(fits), f"{where}: {which} is not one")
 
 
 def _check_repeat(
@@ -245,4 +260,14 @@ def _check_repeat(
     same = np.array_equal(first.uv, second.uv)
     if isinstance(first, Parameterization) and isinstance(second, Parameterization):
         same = same and np.array_equal(first.corners, second.corners)
-    assert same, f"{where}: another map under the same seed"
+    _promise(same, f"{where}: another map under the same seed")
+
+
+def _promise(kept: bool, otherwise: str) -> None:
+    """Hold a method to one promise; unlike `assert`, this does so under `python -O` as well.
+
+    Raises:
+        BrokenPromiseError: the promise is not kept; the message is `otherwise`.
+    """
+    if not kept:
+        raise BrokenPromiseError(otherwise)

@@ -8,6 +8,7 @@ from reports.contents import contents
 from reports.page import pages as page
 from reports.pictures import drawing as pictures
 from reports.pictures import exports, figures
+from reports.pictures.names import slug
 from reports.tables import formats
 from reports.tables import suites as tables
 
@@ -27,7 +28,7 @@ def write(folder: Path, *, jobs: int, textured: bool = False) -> Path:
     sections = []
     for suite in contents(folder):
         made = tables.tables(suite)
-        name = pictures.slug(suite.suite)
+        name = slug(suite.suite)
         formats.write([*made, tables.everything(suite)], report / "tables" / name)
         drawn_in = report / "figures" / name
         faults = pictures.draw(suite, drawn_in / "pictures", jobs)

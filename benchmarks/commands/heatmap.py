@@ -1,4 +1,4 @@
-"""Pictures of the distortion of a map, face by face: on the surface and in the UV plane."""
+"""Draws the distortion of a map face by face, on the surface and in the UV plane."""
 
 from __future__ import annotations
 
@@ -12,18 +12,19 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import Colormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 
-from benchmarks.metrics.table import MapState
+from benchmarks.metrics.state import MapState
 from parapoint.errors import InputError
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 
 PIXELS = 560
-"""Side of each picture of the surface."""
+"""Side of each picture of the surface, in pixels."""
 LARGEST_RATIOS = (1.05, 1.2, 1.5, 2.0, 4.0, 10.0, 100.0)
-"""Where a colour scale may end: at the first that 95 % of the faces do not exceed."""
+"""Ratios at which a colour scale may end. It ends at the first that 95 % of the faces do not
+exceed."""
 CONFORMAL_COLOURS, AREA_COLOURS = "YlGnBu", "PuOr"
-"""Light is ideal. Colour-blind readers can tell both: by lightness, and orange from purple."""
+"""Colour maps in which light is ideal. Colour-blind readers can tell their colours apart."""
 MISSING = (0.6, 0.6, 0.6)
-"""Colour of faces without distortion: degenerate in 3D."""
+"""Colour of faces that are degenerate in 3D and so have no distortion."""
 OUTLINE = (0.5, 0.5, 0.5, 0.25)
 """Colour of the outlines of faces that span a seam."""
 VIEWS = (np.array([0.55, 0.35, 1.0]), np.array([-0.55, 0.35, -1.0]))
@@ -34,7 +35,7 @@ def write_heatmap(state: MapState, path: Path, *, title: str) -> None:
     """Draw conformal and area distortion of every face, from two sides and in the UV plane.
 
     Raises:
-        InputError: the path is no .png.
+        InputError: the path does not end in .png.
         OSError: the file cannot be written.
     """
     if path.suffix.lower() != ".png":
@@ -43,7 +44,7 @@ def write_heatmap(state: MapState, path: Path, *, title: str) -> None:
     conformal, ratio = np.full(faces, np.nan), np.full(faces, np.nan)
     conformal[distortion.faces] = distortion.quasi_conformal
     ratio[distortion.faces] = distortion.area_ratio
-    # Both scales are logarithmic; what lies beyond their ends has the colour of the end.
+    # Both scales are logarithmic. A value beyond an end has the colour of that end.
     top = _scale_end(distortion.quasi_conformal)
     area_top = _scale_end(np.exp(np.minimum(distortion.area_log_ratio, 700.0)))
     rows: list[tuple[str, FloatArray, Normalize, Colormap]] = [
@@ -99,14 +100,14 @@ def _scale_end(ratios: FloatArray) -> float:
 
 
 def _ticks(norm: Normalize) -> list[float]:
-    """Five ticks, evenly spread on the logarithmic scale, of three digits."""
+    """Five values with three digits, spread evenly over a logarithmic scale."""
     assert norm.vmin is not None
     assert norm.vmax is not None
     return [float(f"{tick:.3g}") for tick in np.geomspace(norm.vmin, norm.vmax, 5)]
 
 
 def _visible(mesh: Mesh, towards: FloatArray) -> tuple[IntArray, FloatArray]:
-    """The face seen at each pixel (-1 for none) and how brightly it is lit, (PIXELS, PIXELS)."""
+    """(PIXELS, PIXELS) the face seen at each pixel, -1 for none, and how brightly it is lit."""
     back = towards / np.linalg.norm(towards)
     right = np.cross([0.0, 1.0, 0.0], back)
     right /= np.linalg.norm(right)
@@ -127,13 +128,14 @@ def _visible(mesh: Mesh, towards: FloatArray) -> tuple[IntArray, FloatArray]:
     normal = np.cross(b - a, c - a)
     length = np.linalg.norm(normal, axis=1)
     facing = np.abs(normal @ back) / np.where(length > 0, length, 1.0)
-    # Both sides are lit alike, from the eye; shade stays light, so that colours can be compared.
+    # Light comes from the eye and falls on both sides alike. Shades stay light enough that colours
+    # can be compared.
     shade = np.where(face >= 0, 0.55 + 0.45 * facing[face], 1.0)
     return face.reshape(PIXELS, PIXELS), shade.reshape(PIXELS, PIXELS)
 
 
 def _draw_plane(axis: Any, state: MapState, colour: FloatArray) -> None:
-    """The UV layout; faces that span a seam lie below, as outlines, since they cover the others."""
+    """Draw the UV layout. Faces that span a seam would hide others: they are outlines below."""
     images = state.parameterization.uv[state.parameterization.corners]
     spanning = state.spanning
     axis.add_collection(
@@ -141,7 +143,7 @@ def _draw_plane(axis: Any, state: MapState, colour: FloatArray) -> None:
             list(images[spanning]), facecolors="none", edgecolors=OUTLINE, linewidths=0.3
         )
     )
-    # Smoothed sides would let the paper shine through between neighbours.
+    # Antialiased sides would let the background show between neighbouring faces.
     axis.add_collection(
         PolyCollection(
             list(images[~spanning]), facecolors=colour[~spanning], linewidths=0, antialiaseds=False

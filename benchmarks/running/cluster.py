@@ -1,13 +1,15 @@
-"""Cells on the workers of a cluster: below each, the supervisors of `benchmarks.running.local`.
+"""Runs cells on the workers of a dask cluster; each worker has supervisors of its own.
 
-No file system is shared with a worker: a task carries the content of the files that it reads, and
-its answer that of the map. A worker must have the same version of the project and of the packages
-it asks for; one that has not ends the run with a line that says so.
+A worker need not share a file system with the run: a task carries the content of the files that it
+reads, and the answer carries the content of the map. A worker must have the same version of the
+project, and of the packages that the project asks for, as the run; if it has not, the run ends with
+a line that says so.
 """
 
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import socket
 import tempfile
 import threading
@@ -19,23 +21,23 @@ from typing import Any, Self
 
 from benchmarks.running import environment, scratch
 from benchmarks.running.local import Local
-from benchmarks.running.tasks import Outcome, Task, Tick
+from benchmarks.running.tasks import MeasureJob, Outcome, RunJob, Task, Tick, from_json, to_json
 from benchmarks.store.archives import disk_said, replacing
 from parapoint.errors import InputError
 
 CONNECT_SECONDS = 30
-"""How long a scheduler may take to answer, and its first worker to be there."""
+"""Seconds that a scheduler may take to answer, and then its first worker to appear."""
 WORKER_LOST = "two workers died while they ran it; run again"
-"""Reason of a row that the next run does anew: machines go away through no fault of a method."""
+"""Reason of a cell whose machines went away; the next run repeats it, and blames no method."""
 WORKER_GIGABYTES = 2
-"""Memory of a Slurm job beside that of its cell: for the worker and the supervisor."""
+"""Memory in GB that a Slurm job gets on top of its cell's, for the worker and the supervisor."""
 
 Client = Any
-"""A `distributed.Client`; the package is optional, and half of it has no types."""
+"""A `distributed.Client`. That package is optional, and half of it has no types."""
 
 
 class Remote:
-    """Supervisors below the workers of a dask scheduler."""
+    """The executor (`tasks.Executor`) that uses the workers of a dask scheduler."""
 
     def __init__(
         self,
@@ -44,7 +46,14 @@ class Remote:
         jobs: int,
         tick: Tick,
     ) -> None:
-        """`connected` makes the client, and leaves what is to be closed after the run."""
+        """An executor that connects when it is entered.
+
+        Args:
+            connected: makes the client, and puts what must be closed after the run on the stack.
+            folder: scratch folder of the run on this machine.
+            jobs: how many tasks it does at a time.
+            tick: called several times a second.
+        """
         self.connected = connected
         self.folder = folder
         self.threads = environment.threads(environment.cores())
@@ -64,12 +73,12 @@ class Remote:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Disconnect; workers that the run has started end."""
+        """Disconnect, and end the workers that the run has started."""
         self.open.close()
         scratch.remove(self.folder)
 
     def run(self, tasks: Sequence[Task], jobs: int) -> None:
-        """Do all tasks, `jobs` at a time, so that no worker holds one that it does not run."""
+        """Do all tasks, sending `jobs` at a time at most, so that no worker keeps one waiting."""
         import distributed
 
         wait: Any = distributed.wait
@@ -87,15 +96,15 @@ class Remote:
             self.tick()
 
     def _sent(self, task: Task) -> Any:
-        """The future of a task."""
+        """Send a task to the scheduler, with the content of the files that it reads; its future."""
         plugins = []
-        for plugin in task.job.get("plugins", ()):
+        for plugin in task.job.plugins if isinstance(task.job, RunJob) else ():
             path, _, name = plugin.rpartition(":")
             plugins.append((Path(path).name, name, Path(path).read_bytes()))
-        inputs = {name: path.read_bytes() for name, path in task.inputs.items()}
+        inputs = {name: path.read_bytes() for name, path in task.job.inputs.items()}
         return self.client.submit(
             performed,
-            task.job,
+            to_json(task.job),
             inputs,
             plugins,
             self.threads,
@@ -105,18 +114,20 @@ class Remote:
         )
 
     def _end(self, task: Task, future: Any) -> None:
-        """Take in the answer to a task.
+        """Hand on the outcome that the future of a task brings.
 
         Raises:
-            InputError: the scheduler or a worker is of no use for this run.
+            InputError: the scheduler has gone away, or a worker cannot run the project.
         """
         import distributed
 
         try:
-            outcome, printed, content = future.result()
+            line, content = future.result()
+            outcome = from_json(line, Outcome)
         except distributed.KilledWorker:
-            outcome = {"status": "failed", "reason": WORKER_LOST, "took": 0.0}
-            printed, content = "", b""
+            outcome, content = Outcome("failed", WORKER_LOST), b""
+        except ValueError as error:
+            outcome, content = Outcome("failed", f"its dask worker answered nonsense: {error}"), b""
         except (CancelledError, OSError):
             raise InputError(
                 "the dask scheduler is gone; earlier results are intact: run the same command again"
@@ -127,31 +138,31 @@ class Remote:
         if content:
             with disk_said(path), replacing(path) as stream:
                 stream.write(content)
-        task.ended(outcome, printed, path)
+        task.ended(outcome, path)
 
 
 _worker = threading.local()
-"""Of each thread of a dask worker: its supervisor, which all tasks share that it is given."""
+"""The executor of each thread of a dask worker; all tasks that the thread gets share it."""
 
 
 def performed(
-    job: Mapping[str, Any],
+    line: bytes,
     inputs: Mapping[str, bytes],
     plugins: Sequence[tuple[str, str, bytes]],
     threads: int,
     project: str,
     *,
     modules: tuple[str, ...],
-) -> tuple[Outcome, str, bytes]:
-    """Do a task on a worker: its outcome, the last lines printed, and the map file.
+) -> tuple[bytes, bytes]:
+    """Do a job on a worker: its outcome as a line of JSON, and the content of its map file.
 
     Args:
-        job: what the supervisor is told.
-        inputs: the content of the files that the task reads.
+        line: the job, as `to_json` writes it; its paths are those of the run's machine.
+        inputs: the content of the files that the job reads, by the names of their fields.
         plugins: file name, class and source of each method that comes with it.
-        threads: how many threads it may use.
+        threads: how many threads the job may use.
         project: version of the project that sends it.
-        modules: what its supervisor is to have imported.
+        modules: packages that the supervisor imports before it forks.
 
     Raises:
         InputError: this worker has another version, or its disk is full.
@@ -162,30 +173,33 @@ def performed(
             f"the dask worker on {host} has another version of the project, or of a package that "
             "it asks for; give it the same, and start it again"
         )
+    job = from_json(line, RunJob, MeasureJob)
     if not hasattr(_worker, "local"):
         _worker.local = Local(Path(), threads, lambda: None)
     local: Local = _worker.local
-    answers: list[tuple[Outcome, str, bytes]] = []
+    answers: list[tuple[bytes, bytes]] = []
 
-    def ended(outcome: Outcome, printed: str, path: Path) -> None:
-        outcome["host"] = f"{host} ({environment.processor()})"
-        answers.append((outcome, printed, path.read_bytes() if path.exists() else b""))
+    def ended(outcome: Outcome, path: Path) -> None:
+        outcome = dataclasses.replace(outcome, host=f"{host} ({environment.processor()})")
+        answers.append((to_json(outcome), path.read_bytes() if path.exists() else b""))
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         local.folder = folder / "cells"
-        places = {key: folder / f"{key}.npz" for key in inputs}
-        for key, path in places.items():
-            path.write_bytes(inputs[key])
+        places = {field: folder / f"{field}.npz" for field in inputs}
+        for field, path in places.items():
+            path.write_bytes(inputs[field])
+        job = job.reading(places)
         locations = []
         for n, (file, kind, source) in enumerate(plugins):
             path = folder / str(n) / file
             path.parent.mkdir()
             path.write_bytes(source)
             locations.append(f"{path}:{kind}")
-        task = Task({**job, "plugins": locations}, places, lambda: None, ended, modules)
+        if isinstance(job, RunJob):
+            job = dataclasses.replace(job, plugins=tuple(locations))
         try:
-            local.run([task], 1)
+            local.run([Task(job, lambda: None, ended, modules)], 1)
         except BaseException:
             del _worker.local
             local.__exit__()
@@ -195,10 +209,10 @@ def performed(
 
 
 def dask_client(address: str, opened: contextlib.ExitStack) -> Client:
-    """A client of the scheduler at `address`, which has a worker.
+    """A client of the scheduler at `address`, once that has a worker.
 
     Raises:
-        InputError: it does not answer, or has no worker.
+        InputError: the scheduler does not answer, or has no worker.
     """
     import distributed
 
@@ -221,9 +235,9 @@ def dask_client(address: str, opened: contextlib.ExitStack) -> Client:
 
 
 def slurm_client(jobs: int, memory: float, threads: int, opened: contextlib.ExitStack) -> Client:
-    """A client of `jobs` workers, each a Slurm job; they may wait in the queue for long.
+    """A client of `jobs` workers, each a Slurm job, which may wait long in Slurm's queue.
 
-    Partition, account and wall time are those of dask-jobqueue's own configuration
+    Partition, account and wall time come from dask-jobqueue's own configuration
     (`jobqueue.slurm.queue`, `.account`, `.walltime` in ~/.config/dask/jobqueue.yaml).
     """
     import distributed
@@ -244,7 +258,7 @@ def slurm_client(jobs: int, memory: float, threads: int, opened: contextlib.Exit
 
 
 def _patient_once(client: Client) -> Client:
-    """`client`, whose scheduler runs a task whose worker died once again, and no more."""
+    """The client, told that its scheduler repeats a task once if the task's worker dies."""
 
     def once(dask_scheduler: Any) -> None:  # a closure: the scheduler need not have the project
         dask_scheduler.allowed_failures = 1

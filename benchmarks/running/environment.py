@@ -1,4 +1,4 @@
-"""What a run's numbers depend on besides the code of a method: commit, versions, machine."""
+"""What the numbers of a run depend on besides its methods: commit, versions, machine."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[2]
 
 MACHINE = ("python", "packages", "platform", "cpu", "cores", "memory_mb", "gpu")
-"""Entries that say where a cell ran: a cell that failed is tried again where they differ."""
+"""Entries that say where a cell ran. A cell that failed is tried again if one of them differs."""
 
 
 def environment() -> dict[str, Any]:
@@ -44,7 +44,7 @@ def cores() -> int:
 
 
 def memory() -> int:
-    """Bytes of memory that this machine, or the container on it, has."""
+    """Bytes of memory that this machine has, or the container that the process runs in."""
     import psutil
 
     total = int(psutil.virtual_memory().total)
@@ -55,13 +55,13 @@ def memory() -> int:
 
 
 def threads(jobs: int) -> int:
-    """Threads a cell may use while `jobs` run at a time: OMP_NUM_THREADS where the user set it."""
+    """Threads that a cell may use while `jobs` cells run: OMP_NUM_THREADS, if the user set it."""
     wanted = os.environ.get("OMP_NUM_THREADS", "")
     return int(wanted) if wanted.isdigit() and int(wanted) else max(1, cores() // jobs)
 
 
 def _packages() -> dict[str, str]:
-    """Versions of the packages that the project asks for, those that are installed."""
+    """Versions of those packages that the project asks for and that are installed."""
     try:
         wanted = importlib.metadata.requires("parapoint") or []
     except importlib.metadata.PackageNotFoundError:
@@ -93,17 +93,17 @@ def processor() -> str:
 def project() -> str:
     """Hash of the project's source and of the versions of the packages that it asks for.
 
-    Where it is the same, so is what comes of a cell or of a map's metrics.
+    Two machines with the same hash get the same map from a cell, and the same metrics from a map.
     """
     digest = hashlib.sha256(json.dumps(_packages(), sort_keys=True).encode())
     for package in ("parapoint", "baselines", "benchmarks"):
-        for path in sorted((ROOT / package).glob("*.py")):
-            digest.update(path.name.encode() + path.read_bytes())
+        for path in sorted((ROOT / package).rglob("*.py")):
+            digest.update(str(path.relative_to(ROOT)).encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 
 
 def _said_by(*command: str) -> str:
-    """What a program prints, "" where it is missing or fails."""
+    """What a program prints; "" if it is missing or fails."""
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=20, check=True)  # noqa: S603  fixed programs
     except (OSError, subprocess.SubprocessError):

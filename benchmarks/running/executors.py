@@ -1,10 +1,10 @@
-"""Where the cells of a run are worked off: on this machine, or on the workers of a cluster.
+"""Where the cells of a run are done: on this machine, or on the workers of a cluster.
 
-`local` has supervisors as child processes (`benchmarks.running.local`). `dask://HOST:PORT` has the
-same supervisors below each worker of a dask scheduler, and `slurm` starts such workers as jobs of a
-Slurm cluster (`benchmarks.running.cluster`). Whatever the executor, a cell has a process of its own
-under its own limits, its outcome and map come back to the process that began the run, and that
-process alone writes.
+`local` starts supervisors as child processes (`benchmarks.running.local`). `dask://HOST:PORT` has
+the same supervisors below each worker of a dask scheduler, and `slurm` starts such workers as jobs
+of a Slurm cluster (`benchmarks.running.cluster`). With any of them, a cell has a process of its own
+under its own limits; its outcome and its map come back to the process of the run, which alone
+writes into the results folder.
 """
 
 from __future__ import annotations
@@ -25,13 +25,14 @@ def executor(name: str, folder: Path, *, jobs: int, memory: float | None, tick: 
 
     Args:
         name: its name.
-        folder: where tasks may write on this machine; it goes with the executor.
-        jobs: cells at a time.
-        memory: GB that a cell may hold; workers elsewhere have it from nowhere else.
-        tick: called some times a second.
+        folder: scratch folder on this machine; the executor makes it and removes it.
+        jobs: how many cells run at a time.
+        memory: GB that a cell may hold; only `local` can do without, as it knows the machine.
+        tick: called several times a second.
 
     Raises:
-        InputError: there is no such executor, a package that it needs is missing, or `memory` is.
+        InputError: there is no such executor, a package that it needs is missing, or `memory` is
+            None where it is needed.
     """
     if name == "local":
         return Local(folder, environment.threads(jobs), tick)

@@ -1,9 +1,9 @@
-"""Cells on this machine: supervisors (`benchmarks.running.worker`) as child processes."""
+"""Runs cells on this machine, below supervisors (`benchmarks.running.worker`) that it starts."""
 
 from __future__ import annotations
 
 import contextlib
-import json
+import dataclasses
 import math
 import os
 import selectors
@@ -20,14 +20,14 @@ from typing import Self
 import psutil
 
 from benchmarks.running import environment, scratch
-from benchmarks.running.tasks import Outcome, Task, Tick
+from benchmarks.running.tasks import Message, Outcome, Ready, Task, Tick, from_json, to_json
 from benchmarks.store.archives import disk_said
 from parapoint.errors import InputError
 
 GRACE = 15.0
-"""Seconds past its limit after which a supervisor itself counts as hung."""
+"""Seconds past a cell's time limit after which its supervisor counts as hung."""
 OUTPUT_KEPT = 1 << 16
-"""Bytes of a method's output that are held; what came before is dropped."""
+"""Bytes of a method's output that are kept in memory: the last ones."""
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
@@ -36,13 +36,14 @@ THREAD_VARIABLES = (
     "VECLIB_MAXIMUM_THREADS",
     "IGL_NUM_THREADS",
 )
+"""Environment variables by which libraries are told how many threads they may start."""
 
 
 class _Slot:
-    """A supervisor process, and the task that it is busy with or gets once it is ready."""
+    """A supervisor process, and the task that it does, or will do once it is ready."""
 
     def __init__(self, threads: int, modules: tuple[str, ...]) -> None:
-        """Start a supervisor with `modules`, whose children may use `threads` threads."""
+        """Start a supervisor that imports `modules` and whose cells may use `threads` threads."""
         self.modules = modules
         self.replies, send = os.pipe()
         variables = dict.fromkeys(THREAD_VARIABLES, str(threads)) | {"PYTHONHASHSEED": "0"}
@@ -73,35 +74,38 @@ class _Slot:
 
     @property
     def time_limit(self) -> float:
-        """Seconds that the task may take."""
-        return float(self.task.job["time_limit"]) if self.task else math.inf
+        """Seconds that the task may take; infinite without a task."""
+        return self.task.job.time_limit if self.task else math.inf
 
     def begin(self, task: Task, folder: Path) -> None:
-        """Begin its task, which may write into `folder`."""
+        """Send the supervisor its task, which may write into `folder`."""
         self.printed.clear()
         self.folder = folder
         self.started = time.monotonic()
-        inputs = {name: str(path.resolve()) for name, path in task.inputs.items()}
-        places = {"map": str(folder / "map.npz"), "work": str(folder / "work")}
-        job = {**task.job, **inputs, **places}
-        with contextlib.suppress(OSError):  # a supervisor that is gone is heard of next
-            self.jobs.write(json.dumps(job).encode() + b"\n")
+        inputs = {name: path.resolve() for name, path in task.job.inputs.items()}
+        job = dataclasses.replace(task.job.reading(inputs), folder=folder)
+        with contextlib.suppress(OSError):  # `hear` notices a supervisor that is gone
+            self.jobs.write(to_json(job))
 
-    def hear(self) -> list[Outcome] | None:
-        """Outcomes that have come in; None once the supervisor is gone."""
+    def hear(self) -> list[Message] | None:
+        """The messages that have come in; None once the supervisor is gone.
+
+        Raises:
+            ValueError: a line is no message.
+        """
         content = _available(self.replies)
         if content is None:
             return None
         *lines, self.reply = (self.reply + content).split(b"\n")
-        return [json.loads(line) for line in lines]
+        return [from_json(bytes(line), Ready, Outcome) for line in lines]
 
     def drain(self) -> None:
-        """Take in what was printed, so that no method waits for a reader; keep the end of it."""
+        """Read what the method has printed, so that it never waits for a reader; keep the end."""
         self.printed += _available(self.output) or b""
         del self.printed[:-OUTPUT_KEPT]
 
     def close(self) -> None:
-        """End the supervisor and with it all that runs below it."""
+        """End the supervisor, and every process below it."""
         with contextlib.suppress(OSError):
             self.jobs.close()
         try:
@@ -119,7 +123,7 @@ class _Slot:
 
 
 def _available(pipe: int) -> bytes | None:
-    """What can be read from `pipe` at once, one megabyte or so at most; None at its end."""
+    """What can be read from `pipe` without waiting, about a megabyte at most; None at its end."""
     content = bytearray()
     while len(content) < 1 << 20:
         try:
@@ -133,10 +137,16 @@ def _available(pipe: int) -> bytes | None:
 
 
 class Local:
-    """Supervisors on this machine."""
+    """The executor (`tasks.Executor`) of this machine."""
 
     def __init__(self, folder: Path, threads: int, tick: Tick) -> None:
-        """Tasks write into folders below `folder`, which goes with the executor."""
+        """An executor without supervisors yet.
+
+        Args:
+            folder: scratch folder of the run; each task writes into a folder below it.
+            threads: how many threads a cell may use.
+            tick: called several times a second.
+        """
         self.folder = folder
         self.threads = threads
         self.width = environment.cores()
@@ -144,15 +154,15 @@ class Local:
         self.selector = selectors.DefaultSelector()
         self.slots: set[_Slot] = set()
         self.harmful: set[tuple[str, ...]] = set()
-        """Modules whose import ended a supervisor: tasks import these themselves."""
+        """Modules whose import ended a supervisor; tasks that need them import them themselves."""
 
     def __enter__(self) -> Self:
-        """Clear what a run that was killed has left."""
+        """Clear what a run that was killed may have left."""
         scratch.clear(self.folder)
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End all supervisors and what runs below them."""
+        """End all supervisors, and every process below them."""
         for slot in self.slots:
             slot.close()
         self.selector.close()
@@ -168,10 +178,11 @@ class Local:
             self.tick()
 
     def _busy(self) -> int:
+        """How many supervisors have a task."""
         return sum(slot.task is not None for slot in self.slots)
 
     def _assign(self, task: Task) -> None:
-        """Give `task` to an idle supervisor that has its modules, or to a new one."""
+        """Give a task to an idle supervisor that has its modules, or to a new one."""
         modules = () if task.modules in self.harmful else task.modules
         for slot in self.slots:
             if slot.task is None and slot.modules == modules:
@@ -185,6 +196,7 @@ class Local:
         self.selector.register(slot.output, selectors.EVENT_READ, slot)
 
     def _begin(self, slot: _Slot, task: Task) -> None:
+        """Let a supervisor that is ready begin its task, in a new folder."""
         with disk_said(self.folder):
             self.folder.mkdir(exist_ok=True)
             folder = Path(tempfile.mkdtemp(dir=self.folder)).resolve()
@@ -193,24 +205,42 @@ class Local:
         task.began()
 
     def _listen(self) -> None:
-        """Wait a moment for news, and deal with it."""
+        """Wait a moment for messages, and deal with them; notice supervisors that hang."""
         for slot in {key.data for key, _ in self.selector.select(0.1)}:
-            news = slot.hear()
+            try:
+                news = slot.hear()
+            except ValueError as error:
+                self._lost(slot, f"the process that watched over it answered nonsense: {error}")
+                continue
             slot.drain()
-            for outcome in news or ():
-                if slot.task is not None and slot.ready:
-                    self._end(slot, outcome)
-                elif slot.task is not None:
-                    slot.ready = True
-                    self._begin(slot, slot.task)
+            for message in news or ():
+                self._take_in(slot, message)
             if news is None:
-                self._lost(slot)
+                self._lost(slot, "killed the process that watched over it")
         now = time.monotonic()
         for slot in [slot for slot in self.slots if now > slot.started + slot.time_limit + GRACE]:
-            self._lost(slot)
+            self._lost(slot, "")
 
-    def _lost(self, slot: _Slot) -> None:
-        """Deal with a supervisor that is gone or hangs: a task that it had begun ends with it."""
+    def _take_in(self, slot: _Slot, message: Message) -> None:
+        """Deal with a message. A supervisor without a task has nothing to say."""
+        if slot.task is None:
+            return
+        if isinstance(message, Outcome) and slot.ready:
+            self._end(slot, message)
+        elif isinstance(message, Ready) and not slot.ready:
+            slot.ready = True
+            self._begin(slot, slot.task)
+
+    def _lost(self, slot: _Slot, reason: str) -> None:
+        """Give up a supervisor that has ended or hangs.
+
+        Args:
+            slot: the supervisor.
+            reason: why the task that it had begun fails, unless its time is over.
+
+        Raises:
+            RuntimeError: it had no task, so that nothing but our own code can have ended it.
+        """
         self.slots.discard(slot)
         self.selector.unregister(slot.replies)
         self.selector.unregister(slot.output)
@@ -222,26 +252,31 @@ class Local:
             said = last_lines(slot.printed, lines=1)
             raise RuntimeError(f"benchmarks.running.worker ended unasked: {said}")
         elif time.monotonic() > slot.started + slot.time_limit:
-            reason = f"not done within the limit of {slot.time_limit:g} s, and hard to kill"
-            self._end(slot, {"status": "timeout", "reason": reason})
+            late = f"not done within the limit of {slot.time_limit:g} s, and hard to kill"
+            self._end(slot, Outcome("timeout", late))
         else:
-            reason = "killed the process that watched over it"
-            self._end(slot, {"status": "failed", "reason": reason})
+            self._end(slot, Outcome("failed", reason))
 
     def _end(self, slot: _Slot, outcome: Outcome) -> None:
+        """Hand on the outcome of the task that a supervisor has done.
+
+        Raises:
+            InputError: this machine failed, so that the run cannot go on.
+        """
         task = slot.task
         assert task is not None
         slot.task = None
-        if outcome["status"] == "stop":
+        if outcome.fatal:
             raise InputError(
-                f"{outcome['reason']}; earlier results are intact: mend that and run again"
+                f"{outcome.reason}; earlier results are intact: mend that and run again"
             )
-        outcome["took"] = time.monotonic() - slot.started
-        task.ended(outcome, last_lines(slot.printed), slot.folder / "map.npz")
+        took, printed = time.monotonic() - slot.started, last_lines(slot.printed)
+        outcome = dataclasses.replace(outcome, took=took, printed=printed)
+        task.ended(outcome, slot.folder / "map.npz")
         shutil.rmtree(slot.folder, ignore_errors=True)
 
 
 def last_lines(printed: bytes | bytearray, lines: int = 20, characters: int = 4000) -> str:
-    """The end of what a method printed."""
+    """The last lines of what a method printed, that many characters at most."""
     text = printed.decode(errors="replace")[-characters:]
     return "\n".join(text.splitlines()[-lines:])

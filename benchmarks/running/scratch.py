@@ -1,4 +1,4 @@
-"""The scratch folder of a run: made by us, known by a mark, and never anybody else's."""
+"""The scratch folder of a run. A mark in it tells that a run made it; no other is ever touched."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from pathlib import Path
 from parapoint.errors import InputError
 
 NAME = ".parapoint-cells"
-"""Name of the scratch folder below a folder of results."""
+"""Name of the scratch folder inside a results folder."""
 MARK = ".made-by-parapoint"
-"""Name of the file by which a scratch folder is known as ours."""
+"""Name of the file that marks a folder as a scratch folder."""
 
 
 def clear(folder: Path) -> None:
-    """Make an empty scratch folder; what a run that was killed has left in it is removed.
+    """Make an empty scratch folder, and remove what a killed run has left in it.
 
     Raises:
-        InputError: there is something of that name that we did not make.
+        InputError: something of that name exists that no run made.
     """
     remove(folder)
     is_free = not folder.exists() or (folder.is_dir() and not any(folder.iterdir()))
@@ -28,6 +28,6 @@ def clear(folder: Path) -> None:
 
 
 def remove(folder: Path) -> None:
-    """Remove a scratch folder; a folder without our mark, or a link to one, stays."""
+    """Remove a scratch folder. A folder without the mark stays, and so does a link to a folder."""
     if not folder.is_symlink() and (folder / MARK).is_file():
         shutil.rmtree(folder, ignore_errors=True)

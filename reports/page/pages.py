@@ -18,14 +18,15 @@ from matplotlib import colormaps
 from matplotlib.colors import to_hex
 from PIL import Image
 
-from benchmarks.store.results import ResultRow
+from benchmarks.rendering.maps import ANGLE_SCALE, AREA_SCALE
+from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
 from parapoint.surfaces.surface import Mesh
 from reports.contents import AREA, Contents, Label, number, suite_title
 from reports.page import viewer
 from reports.pictures import exports
-from reports.pictures.drawing import ANGLE_SCALE, AREA_SCALE, VIEWED, map_file, model_file, slug
 from reports.pictures.figures import Drawn
+from reports.pictures.names import VIEWED, map_file, model_file, slug
 from reports.tables import leaderboard
 from reports.tables.leaderboard import MEASURES, SHOWN, Glance, Winner, definition, page_of, winner
 from reports.tables.published import published_values

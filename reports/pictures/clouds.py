@@ -14,16 +14,25 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from benchmarks.metrics.pointwise import PointMap, point_map
+from benchmarks.rendering.colours import (
+    DARK_TONE,
+    LIGHT_TONE,
+    SEAM_GREEN,
+    Floats,
+    Image,
+    averaged,
+    linear,
+)
+from benchmarks.rendering.scene import Scene, View
+from benchmarks.rendering.viewpoints import two_cameras
 from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import PointParameterization
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh, PointCloud
-from reports.pictures import render
-from reports.pictures.render import Floats, Image, Scene, View
 
 SPARSE, DENSE = 10_000, 250_000
 """Points of the paper's input, and of its texture mapping."""
 
-GREY = render.linear([0.62, 0.62, 0.62])
+GREY = linear([0.62, 0.62, 0.62])
 
 DOT, SEAM_DOT = 0.38, 0.5
 """Radius of a dot in the cloud, and of one on a seam, in mean distances of the sparse points."""
@@ -89,7 +98,7 @@ def images(
     tones = sparse.at(colours).astype(np.float32)
     _, densely = cKDTree(dense.positions).query(seen, workers=-1)
     field = np.floor(dense.uv(uv, spanning) * squares).sum(axis=1) % 2 == 0
-    checker = np.where(field[:, None], render.LIGHT_TONE, render.DARK_TONE)
+    checker = np.where(field[:, None], LIGHT_TONE, DARK_TONE)
     return {
         "cloud": _part(view, dots).image(tones[nearest[dots]], lit=False),
         "cloud-uv": _planar(sparse.uv(uv, spanning), tones, view),
@@ -126,7 +135,7 @@ class Portrait:
         self._radius = np.minimum(near[:, 1:].mean(axis=1), 3 * np.median(near[:, 1:]))
         self._fields = fields
         scene = Scene(self._disks(), shadows=False)
-        cameras = render.two_cameras(scene)
+        cameras = two_cameras(scene)
         self._views = [scene.view(camera, size, samples) for camera in cameras]
 
     def _disks(self) -> Mesh:
@@ -170,10 +179,10 @@ class Portrait:
         found = point_map(self.cloud, result)
         view = self._views[0]
         point, dots = self._dots(view)
-        tones = render.linear(0.5 + 0.42 * self._normals @ view.camera.axes.T)
+        tones = linear(0.5 + 0.42 * self._normals @ view.camera.axes.T)
         field = np.floor(found.uv / self._field(found)).sum(axis=1) % 2 == 0
-        checker = np.where(field[:, None], render.LIGHT_TONE, render.DARK_TONE)
-        seam = np.where(found.spanning[:, None], render.SEAM_GREEN, GREY)
+        checker = np.where(field[:, None], LIGHT_TONE, DARK_TONE)
+        seam = np.where(found.spanning[:, None], SEAM_GREEN, GREY)
         kept = dots | found.spanning[point]
         makers: dict[str, Callable[[], Image]] = {
             "cloud": lambda: _part(view, dots).image(tones[point[dots]], lit=False),
@@ -212,7 +221,7 @@ def _seams(view: View, seam: FloatArray, dots: BoolArray, seen: Floats, spacing:
         distance, _ = cKDTree(seam).query(seen, distance_upper_bound=SEAM_DOT * spacing, workers=-1)
         green = np.isfinite(distance)
     kept = dots | green
-    colours = np.where(green[kept, None], render.SEAM_GREEN, GREY)
+    colours = np.where(green[kept, None], SEAM_GREEN, GREY)
     return _part(view, kept).image(colours.astype(np.float32))
 
 
@@ -229,6 +238,6 @@ def _planar(uv: FloatArray, tones: Floats, view: View) -> Image:
     radius = DOT * 1.2 * float(np.sqrt(extent.prod() / len(uv)))
     distance, nearest = cKDTree(uv).query(grid, distance_upper_bound=radius, workers=-1)
     found = np.isfinite(distance)
-    return render.averaged(
+    return averaged(
         (int(height), int(width)), samples, np.flatnonzero(found), tones[nearest[found]]
     )

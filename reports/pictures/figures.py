@@ -23,11 +23,11 @@ from matplotlib.image import AxesImage
 from PIL import Image as Images
 from pypdf import PdfWriter
 
-from benchmarks.store.results import ResultRow
+from benchmarks.store.rows import ResultRow
 from parapoint.sources import source_hash
 from reports.contents import SHEETS, Contents
 from reports.pictures.clouds import DENSE, SPARSE
-from reports.pictures.drawing import known_keys, slug
+from reports.pictures.drawing import known_keys
 from reports.pictures.galleries import (
     ablation,
     ablation_of_the_paper,
@@ -39,6 +39,7 @@ from reports.pictures.galleries import (
     maps,
     models,
 )
+from reports.pictures.names import slug
 from reports.pictures.plots import (
     area_convergence,
     convergence,

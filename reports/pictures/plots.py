@@ -14,12 +14,12 @@ from benchmarks.metrics.distortion import (
     face_distortion,
     triangles,
 )
-from benchmarks.store.results import ResultRow
+from benchmarks.rendering.maps import Map
+from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray
 from reports.contents import ANGLE, AREA, Contents, Label
-from reports.pictures.drawing import Map
 from reports.pictures.galleries import leading
 from reports.pictures.style import (
     COLOURS,

@@ -5,11 +5,11 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
-from reports.tables.table import Cell, Table, grouped
+from reports.tables.table import Cell, Column, Table, Value, grouped
 
 PAGE = 45
 """Rows of a LaTeX table on one page."""
@@ -57,13 +57,17 @@ _LATEX = {
 }
 
 
+_SUPERSCRIPTS = "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"
+_LOWERED = str.maketrans(_SUPERSCRIPTS, "-0123456789")
+
+
 def latex_text(text: str) -> str:
     """`text` with every character that LaTeX reads otherwise escaped; others outside ASCII as ?."""
     text = " ".join(text.split())
-    pieces = re.split(r"(·10\^−?\d+)", text)
+    pieces = re.split(rf"(·10[{_SUPERSCRIPTS}]+)", text)
     return "".join(
-        rf"$\cdot 10^{{{piece[4:].replace('−', '-')}}}$"
-        if re.fullmatch(r"·10\^−?\d+", piece)
+        rf"$\cdot 10^{{{piece[3:].translate(_LOWERED)}}}$"
+        if piece.startswith("·10") and len(piece) > 3
         else "".join(_LATEX.get(c, c if c.isascii() and c.isprintable() else "?") for c in piece)
         for piece in pieces
     )
@@ -174,9 +178,16 @@ def comma_separated(table: Table) -> str:
     writer.writerow([column.key for column in table.columns])
     for block in table.blocks:
         for row in block:
-            values = [row.get(column.key) for column in table.columns]
+            values = [_full(row, column) for column in table.columns]
             writer.writerow(["" if value is None else value for value in values])
     return out.getvalue()
+
+
+def _full(row: Mapping[str, Value], column: Column) -> Value:
+    """A value in full: a fraction as such, or as per cent where the row's own words say so."""
+    value = row.get(column.key)
+    percent = column.by_row and column.of(row).percent
+    return 100 * value if percent and isinstance(value, int | float) else value
 
 
 _CSS = """

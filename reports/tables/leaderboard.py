@@ -9,10 +9,12 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from benchmarks.metrics.table import GROUPS, METRICS
+from benchmarks.metrics.metric import GROUPS
+from benchmarks.metrics.table import METRICS
 from reports.contents import (
     ANGLE,
     AREA,
+    BIJECTIVE,
     FLIPPED,
     ISOMETRIC,
     POINT_ANGLE,
@@ -22,16 +24,18 @@ from reports.contents import (
     SPANNING,
     Contents,
     Label,
+    number,
 )
-from reports.pictures.drawing import slug
-from reports.ranking import is_of_angles, may_rank
-from reports.tables.table import metric_column
+from reports.means import STATISTICS, common_cases, common_values, own_values, statistic
+from reports.pictures.names import slug
+from reports.ranking import TIMES, Mark, marks, may_rank, means_may_rank, ranks
+from reports.tables.table import Column, metric_column
 
 MEASURES = {
     "Angles": ANGLE,
     "Areas": AREA,
     "Angles and areas": ISOMETRIC,
-    "One to one": "bijective",
+    "One to one": BIJECTIVE,
     "Angles at points": POINT_ANGLE,
     "Areas at points": POINT_AREA,
     "Speed": "seconds",
@@ -41,7 +45,7 @@ MEASURES = {
 SHOWN = (
     *(ANGLE, AREA, ISOMETRIC, FLIPPED, "overlapped_fraction", SPANNING),
     *(POINT_ANGLE, POINT_AREA, POINT_COLLISIONS, POINT_TEARS),
-    "seconds",
+    *TIMES,
 )
 """The metrics that the leaderboard shows before any is chosen."""
 
@@ -62,22 +66,22 @@ class Winner:
 def winner(contents: Contents, case: str, metric: str) -> Winner | None:
     """The best value of `metric` on a model among the methods with one chart; None without any.
 
-    Maps whose grade is too low for that (`reports.ranking`) take no part. Equal is what is equal
-    to three digits.
+    Maps whose grade is too low for that (`reports.ranking`) take no part. Equals win together.
     """
     column = metric_column(metric)
-    values = {
+    fit = {
         str(record["label"]): float(record[metric])
         for record in _by_case(contents).get(case, ())
-        if math.isfinite(record[metric]) and may_rank(record["grade"], angles=is_of_angles(metric))
+        if math.isfinite(record[metric]) and may_rank(record["grade"], angles=column.angles)
     }
-    if not values or (metric == "bijective" and max(values.values()) < 1):
+    if not fit or (metric == BIJECTIVE and max(fit.values()) < 1):
         return None
-    best = (max if column.better == "higher" else min)(values.values())
-    names = tuple(name for name, value in values.items() if f"{value:.2e}" == f"{best:.2e}")
-    if metric == "bijective":
+    texts = [column.shown(value) for value in fit.values()]
+    places = ranks([*fit.values()], texts, column.better, column.tie)
+    names = tuple(name for name, place in zip(fit, places, strict=True) if place == 1)
+    if metric == BIJECTIVE:
         return Winner(names, "")
-    return Winner(names, column.shown(best) + (" s" if metric == "seconds" else ""))
+    return Winner(names, min(zip(places, texts, strict=True))[1] + " s" * (metric in TIMES))
 
 
 @cache
@@ -139,8 +143,8 @@ def page_of(contents: Contents, case: str) -> str:
 
 def definition(name: str) -> str:
     """What a metric is and where it comes from; "" for other columns."""
-    if name == "seconds":
-        return "wall time of the parameterization alone, in seconds"
+    if name in TIMES:
+        return TIME_DEFINITIONS[name]
     metric = METRICS.get(name)
     if metric is None:
         return ""
@@ -151,12 +155,28 @@ def definition(name: str) -> str:
     )
 
 
+TIME_DEFINITIONS = {
+    "seconds": "wall time of the parameterization alone, in seconds",
+    "cpu_seconds": (
+        "processor time of the parameterization alone, over all threads, in seconds; other "
+        "programs on the machine hardly change it"
+    ),
+}
+
+Entry = tuple[str, float | str | None, Mark]
+"""What the page shows of a metric: the value as printed, the value to sort by, and its mark."""
+
+
 def data(suites: Sequence[Contents]) -> dict[str, object]:
-    """All cells with all metrics, as the leaderboard of the page reads them."""
+    """All that the leaderboard of the page shows, printed and ranked: it only picks and sorts.
+
+    By suite: the means of the methods by statistic and by "common" or "own" models, their maps
+    model by model, and every cell.
+    """
     names = [
         name
-        for name in (*METRICS, "seconds")
-        if name == "seconds" or any(name in contents.metrics for contents in suites)
+        for name in (*METRICS, *TIMES)
+        if name in TIMES or any(name in contents.metrics for contents in suites)
     ]
     return {
         "metrics": [_about(name) for name in names],
@@ -166,15 +186,11 @@ def data(suites: Sequence[Contents]) -> dict[str, object]:
 
 
 def _about(name: str) -> dict[str, object]:
-    column = metric_column(name)
     return {
         "name": name,
-        "title": column.title,
-        "group": "cost" if name == "seconds" else GROUPS[METRICS[name].group],
-        "better": column.better or "lower",
-        "digits": column.digits,
-        "percent": column.percent,
-        "angles": column.angles,
+        "title": metric_column(name).title,
+        "head": metric_column(name).head.replace(" ↓", "\u00a0↓").replace(" ↑", "\u00a0↑"),
+        "group": "cost" if name in TIMES else GROUPS[METRICS[name].group],
         "definition": definition(name),
     }
 
@@ -184,7 +200,18 @@ def _suite(contents: Contents, names: Sequence[str]) -> dict[str, object]:
     return {
         "name": contents.suite,
         "methods": [_method(contents, label) for label in contents.methods],
-        "models": [{"name": case, "page": page_of(contents, case)} for case in contents.cases],
+        "models": [
+            {"name": case, "page": page_of(contents, case), "maps": _maps(contents, case, names)}
+            for case in contents.cases
+        ],
+        "common": len(common_cases(contents, contents.cases)),
+        "summaries": {
+            name: {
+                over: _columns([_summary(contents, metric, name, over) for metric in names])
+                for over in ("common", "own")
+            }
+            for name in STATISTICS
+        },
         "cells": [
             {
                 "model": contents.cases.index(row.case),
@@ -192,8 +219,9 @@ def _suite(contents: Contents, names: Sequence[str]) -> dict[str, object]:
                 "seed": row.seed,
                 "status": row.status.replace("_", " "),
                 "reason": row.reason,
-                "grade": by_id[row.id]["grade"] or "",
-                "values": [_number(by_id[row.id], name) for name in names],
+                "entries": [
+                    _entry(metric_column(name), _value(by_id[row.id], name)) for name in names
+                ],
             }
             for row in contents.rows
         ],
@@ -201,12 +229,88 @@ def _suite(contents: Contents, names: Sequence[str]) -> dict[str, object]:
 
 
 def _method(contents: Contents, label: Label) -> dict[str, object]:
-    return {"name": label.short, "detail": label.detail, "atlas": label.short in contents.atlases}
+    """What the page says of a method beside its metrics: how its cells ended, and why."""
+    rows = [row for row in contents.rows if contents.labels[row.id] == label]
+    bad = [row for row in rows if row.status != "ok"]
+    counts = Counter(row.status.replace("_", " ") for row in bad)
+    atlas = label.short in contents.atlases
+    return {
+        "name": label.short,
+        "detail": "many charts, not ranked" if atlas else label.detail,
+        "ok": f"{len(rows) - len(bad)}/{len(rows)}",
+        "share": (len(rows) - len(bad)) / len(rows),
+        "bad": ", ".join(f"{count} {status}" for status, count in counts.items()),
+        "reasons": "\n".join(
+            f"{row.case}: {row.status.replace('_', ' ')}, {row.reason or 'no reason given'}"
+            for row in bad
+        ),
+    }
 
 
-def _number(values: Mapping[object, object], name: str) -> float | str | None:
-    """A value as JSON can hold it, to five digits."""
-    value = values.get(name)
-    if not isinstance(value, int | float) or math.isnan(value):
-        return None
-    return float(f"{value:.5g}") if math.isfinite(value) else str(value)
+def _summary(contents: Contents, metric: str, name: str, over: str) -> list[Entry]:
+    """The entries of all methods for a statistic of a metric, over "common" or "own" models."""
+    column = metric_column(metric)
+    common = common_cases(contents, contents.cases, metric)
+    values, fit = [], []
+    for label in contents.methods:
+        own = (
+            own_values(contents, label, metric)
+            if over == "own"
+            else common_values(contents, label, metric, common)
+        )
+        records = [contents.records.get((case, label.short)) for case in contents.cases]
+        grades = [record["grade"] for record in records if record and record["ok"]]
+        values.append(statistic(name, own, column.better))
+        fit.append(
+            label.short not in contents.atlases and means_may_rank(grades, angles=column.angles)
+        )
+    return _marked(column, values, fit)
+
+
+def _maps(contents: Contents, case: str, names: Sequence[str]) -> list[dict[str, object] | None]:
+    """What the page says of each method on a model; None where the method has no cell."""
+    records = [contents.records.get((case, label.short)) for label in contents.methods]
+    columns = []
+    for metric in names:
+        column = metric_column(metric)
+        fit = [
+            label.short not in contents.atlases
+            and record is not None
+            and may_rank(record["grade"], angles=column.angles)
+            for label, record in zip(contents.methods, records, strict=True)
+        ]
+        columns.append(_marked(column, [number(record, metric) for record in records], fit))
+    return [
+        record
+        and {
+            "status": str(record["status"]).replace("_", " "),
+            "reason": record["reason"],
+            "grade": record["grade"],
+            "entries": entries,
+        }
+        for record, entries in zip(records, _columns(columns), strict=True)
+    ]
+
+
+def _marked(column: Column, values: Sequence[float | None], fit: Sequence[bool]) -> list[Entry]:
+    """Values of a metric printed, and marked where they are `fit` to be ranked."""
+    texts = [column.shown(value) for value in values]
+    ranked = [value if good else None for value, good in zip(values, fit, strict=True)]
+    found = marks(ranked, texts, column.better, column.tie)
+    return [_entry(column, value, mark) for value, mark in zip(values, found, strict=True)]
+
+
+def _entry(column: Column, value: float | None, mark: Mark = "") -> Entry:
+    """An entry whose value is one that JSON can hold, to five digits."""
+    if value is None or math.isnan(value):
+        return column.shown(None), None, mark
+    return column.shown(value), float(f"{value:.5g}") if math.isfinite(value) else str(value), mark
+
+
+def _value(values: Mapping[Any, object], name: str) -> float | None:
+    return number({str(key): value for key, value in values.items()}, name)
+
+
+def _columns(rows: Sequence[list[Entry]]) -> list[list[Entry]]:
+    """Rows as columns."""
+    return [list(column) for column in zip(*rows, strict=True)]

@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks import __main__ as commands
 from benchmarks.cases import models, suites
-from benchmarks.running import runner
+from benchmarks.running import planning, runner
 from benchmarks.store.archives import map_arrays, write_arrays
 from benchmarks.store.results import Store
 from parapoint import console
@@ -160,9 +160,9 @@ def test_a_plugin_joins_the_methods_of_the_suite(monkeypatch, tmp_path, plugin):
 
     def noted(suite, chosen, *_, **__):
         calls.append((suite.cases, [method.spec for method in chosen]))
-        return iter(())
+        return [], []
 
-    monkeypatch.setattr(runner, "_todo", noted)
+    monkeypatch.setattr(planning, "plan", noted)
     monkeypatch.setattr(runner, "_measure", lambda *_: None)
     out = ["--out", str(tmp_path / "out")]
     assert command("run", "builtin", "--plugin", location, "--cases", "cone", *out) == 0

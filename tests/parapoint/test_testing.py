@@ -1,5 +1,7 @@
 """check_method finds each broken promise."""
 
+import subprocess
+import sys
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -10,7 +12,7 @@ from parapoint.method import REQUIREMENTS, UnsupportedError
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization, TracePoint
 from parapoint.surfaces.preparation import prepared
 from parapoint.surfaces.surface import Mesh, PointCloud
-from parapoint.testing import check_method, irregular_disk, sample_surfaces
+from parapoint.testing import BrokenPromiseError, check_method, irregular_disk, sample_surfaces
 
 
 @dataclass(frozen=True)
@@ -165,8 +167,22 @@ def test_honest_methods_pass():
     ids=lambda value: getattr(value, "__name__", type(value).__name__),
 )
 def test_broken_promise_is_named(method, promise):
-    with pytest.raises(AssertionError, match=promise):
+    with pytest.raises(BrokenPromiseError, match=promise):
         check_method(method)
+
+
+def test_a_broken_promise_is_found_when_python_optimizes_too():
+    code = (
+        "from baselines.disks.tutte import Tutte\n"
+        "from parapoint.testing import BrokenPromiseError, check_method\n"
+        "try:\n"
+        "    check_method(Tutte)\n"
+        "except BrokenPromiseError as error:\n"
+        "    print(error)\n"
+    )
+    command = [sys.executable, "-O", "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout == "type: give a method, not its class\n"
 
 
 def test_method_that_can_do_nothing_here_is_unsupported():

@@ -56,7 +56,7 @@ def test_registry_is_complete_and_consistent():
         assert re.fullmatch(r"[0-9a-f]{64}", model.sha256)
         assert re.search(r"/([0-9a-f]{40}|v5\.5\.1)/", model.url), "an address at a commit or tag"
         assert model.licence
-        assert (model.faces == 0) == (model.kind == "point cloud")
+        assert (model.faces == 0) == (model.topology == "point cloud")
         assert bool(model.paper_name) == bool(model.claim) == bool(model.claim_reason)
         assert model.claim in {None, "same model", "likely", "stand-in"}
 

@@ -6,8 +6,9 @@ from numpy.testing import assert_allclose
 from scipy.spatial import cKDTree, distance
 
 from benchmarks.cases import builtin
+from benchmarks.metrics.evaluation import evaluate_points
 from benchmarks.metrics.pointwise import nearest_others, point_map
-from benchmarks.metrics.table import METRICS, evaluate_points
+from benchmarks.metrics.table import METRICS
 from parapoint import InputError, PointCloud, PointParameterization
 
 EXACT = 1e-9

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-import json
+import errno
 import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from baselines import registry
-from benchmarks.running import worker
+from benchmarks.running import cell, worker
 from benchmarks.running.environment import ROOT
+from benchmarks.running.tasks import Outcome, Prepared, Ready, RunJob, from_json, to_json
 from benchmarks.store.archives import read_map, read_surface
-from benchmarks.store.results import Store, measured
+from benchmarks.store.measuring import measured
+from benchmarks.store.results import Store
+from benchmarks.store.rows import SOURCE_CHANGED
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization
 from parapoint.surfaces.surface import Mesh, PointCloud
 from parapoint.testing import sample_surfaces
@@ -38,7 +42,7 @@ UV = TRIANGLE.vertices[:, :2]
     ],
 )
 def test_a_result_must_fit_its_surface(surface, result, says):
-    fault = worker.fault(surface, result)
+    fault = cell.fault(surface, result)
     assert says in fault
     assert bool(fault) == bool(says)
 
@@ -54,9 +58,9 @@ def test_a_result_must_fit_its_surface(surface, result, says):
     ],
 )
 def test_a_death_is_said_in_words(status, killed_by_system, outcome):
-    said = worker._death(int(status), killed_by_system)
-    assert said["status"] == outcome[0]
-    assert said["reason"].startswith(outcome[1])
+    said = worker._death(int(status), killed_by_system=killed_by_system)
+    assert said.status == outcome[0]
+    assert said.reason.startswith(outcome[1])
 
 
 @pytest.mark.parametrize(
@@ -71,9 +75,9 @@ def test_a_death_is_said_in_words(status, killed_by_system, outcome):
     ],
 )
 def test_an_error_is_one_line(error, status, reason):
-    outcome = worker._failure(error)
-    assert outcome["status"] == status
-    assert reason is None or outcome["reason"] == reason
+    found = cell.failure(error)
+    assert found[0] == status
+    assert reason is None or found[1] == reason
 
 
 def test_a_row_says_what_was_done_to_the_surface_before_and_in_which_component_it_failed(
@@ -83,23 +87,24 @@ def test_a_row_says_what_was_done_to_the_surface_before_and_in_which_component_i
     with store.writing():
         surface = store.add_surface(sample_surfaces()["a defective mesh"])
     method = registry.method("tutte")[1]
-    job = {
-        "spec": "tutte",
-        "plugins": [],
-        "seed": 0,
-        "source_hash": registry.source_hash(method),
-        "surface": str(store.surface_path(surface)),
-        "map": str(tmp_path / "map.npz"),
-    }
+    job = RunJob(
+        spec="tutte",
+        seed=0,
+        source_hash=registry.source_hash(method),
+        surface=store.surface_path(surface),
+        folder=tmp_path,
+        time_limit=60.0,
+        memory_limit=1e9,
+    )
     steps = (
         "dropped 1 face without area; dropped 1 duplicate face; split 1 non-manifold edge; split 2 "
         "non-manifold vertices; turned 20 faces; packed 2 components; "
         "automatic cut to a disk (1 of 2 components)"
     )
     receive, send = os.pipe()
-    outcome = worker._outcome(job, send)
-    assert worker._message(bytearray(os.read(receive, 4096))) == {"preprocessing": steps}
-    assert (outcome["status"], outcome["preprocessing"]) == ("ok", steps)
+    outcome = cell.run(job, send)
+    assert worker._said(os.read(receive, 4096)) == (steps, None)
+    assert (outcome.status, outcome.preprocessing) == ("ok", steps)
     mesh, result = read_surface(store.surface_path(surface)), read_map(tmp_path / "map.npz")
     values = measured(mesh, result)
     assert values["chart_count"] == 2
@@ -115,20 +120,21 @@ def test_a_row_says_what_was_done_to_the_surface_before_and_in_which_component_i
         raise ValueError("no")
 
     monkeypatch.setattr(type(method), "parameterize", refusing)
-    outcome = worker._outcome(job, send)
+    outcome = cell.run(job, send)
     os.close(receive)
     os.close(send)
-    assert (outcome["status"], outcome["preprocessing"]) == ("failed", steps)
-    assert outcome["reason"] == "ValueError: no (component 1 of 2, 176 faces)"
+    assert (outcome.status, outcome.preprocessing) == ("failed", steps)
+    assert outcome.reason == "ValueError: no (component 1 of 2, 176 faces)"
 
 
 def test_a_message_counts_only_if_it_is_whole():
-    ahead, whole = b'{"preprocessing": "cut"}\n', b'{"status": "ok"}\n'
-    assert worker._message(bytearray(whole)) == {"status": "ok"}
-    assert worker._message(bytearray(ahead + whole)) == {"preprocessing": "cut", "status": "ok"}
+    ended = Outcome("ok", preprocessing="cut")
+    ahead, whole = to_json(Prepared("cut")), to_json(ended)
+    assert worker._said(whole) == ("", ended)
+    assert worker._said(ahead + whole) == ("cut", ended)
     for length in range(len(whole)):
-        assert worker._message(bytearray(ahead + whole[:length])) == {"preprocessing": "cut"}
-    assert worker._message(bytearray(b"[1]\n\xff\n3\n")) == {}
+        assert worker._said(ahead + whole[:length]) == ("cut", None)
+    assert worker._said(b"[1]\n\xff\n3\n" + to_json(Ready()) + ahead) == ("cut", None)
 
 
 @pytest.mark.parametrize("forks", [True, False])
@@ -154,7 +160,11 @@ def test_a_supervisor_does_one_cell_after_another(tmp_path, forks):
     spec = registry.register_plugin(plugin)
     source_hash = registry.source_hash(registry.method(spec)[1])
     receive, send = os.pipe()
-    code = f"from benchmarks.running import worker; worker.FORKS = {forks}; worker.main()"
+    code = (
+        "from benchmarks.running import limits, worker\n"
+        f"limits.FORKS = worker.FORKS = {forks}\n"
+        "worker.main()"
+    )
     process = subprocess.Popen(
         [sys.executable, "-c", code, str(send)],
         stdin=subprocess.PIPE,
@@ -164,25 +174,64 @@ def test_a_supervisor_does_one_cell_after_another(tmp_path, forks):
     )
     os.close(send)
     assert process.stdin is not None
-    with os.fdopen(receive) as replies:
-        assert json.loads(replies.readline()) == {"status": "ready"}
+    (tmp_path / "work").mkdir()
+    with os.fdopen(receive, "rb") as replies:
+        assert from_json(replies.readline(), Ready) == Ready()
         for seed in (3, 4):
-            job = {
-                "spec": spec,
-                "plugins": [plugin],
-                "seed": seed,
-                "source_hash": source_hash,
-                "surface": str(Store(tmp_path).surface_path(surface)),
-                "map": str(tmp_path / "map.npz"),
-                "work": str(tmp_path),
-                "time_limit": 60,
-                "memory_limit": 1e9,
-            }
-            process.stdin.write(json.dumps(job).encode() + b"\n")
+            job = RunJob(
+                spec=spec,
+                plugins=(plugin,),
+                seed=seed,
+                source_hash=source_hash,
+                surface=Store(tmp_path).surface_path(surface),
+                folder=tmp_path,
+                time_limit=60.0,
+                memory_limit=1e9,
+            )
+            process.stdin.write(to_json(job))
             process.stdin.flush()
-            outcome = json.loads(replies.readline())
-            assert outcome["status"] == "ok", outcome
+            outcome = from_json(replies.readline(), Outcome)
+            assert outcome.status == "ok", outcome
             np.testing.assert_array_equal(read_map(tmp_path / "map.npz").uv, UV + seed)
     printed, _ = process.communicate(timeout=30)
     assert printed == b"hello\nhello\n"
     assert process.returncode == 0
+
+
+def test_a_map_that_cannot_be_written_is_the_machine_s_fault(tmp_path, monkeypatch):
+    store = Store(tmp_path)
+    with store.writing():
+        surface = store.add_surface(TRIANGLE)
+    job = RunJob(
+        spec="tutte",
+        seed=0,
+        source_hash=registry.source_hash(registry.method("tutte")[1]),
+        surface=store.surface_path(surface),
+        folder=tmp_path,
+        time_limit=60.0,
+        memory_limit=1e9,
+    )
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(cell, "write_arrays", full)
+    with Path(os.devnull).open("wb") as ahead:
+        outcome = cell.run(job, ahead.fileno())
+    assert outcome.fatal
+    assert outcome.reason == f"{tmp_path}/map.npz: No space left on device"
+
+
+def test_a_cell_whose_method_has_changed_is_told_so(tmp_path):
+    store = Store(tmp_path)
+    with store.writing():
+        surface = store.add_surface(TRIANGLE)
+    job = RunJob(
+        spec="tutte",
+        seed=0,
+        source_hash="another",
+        surface=store.surface_path(surface),
+        time_limit=60.0,
+        memory_limit=1e9,
+    )
+    assert cell.run(job, -1) == Outcome("failed", SOURCE_CHANGED)

@@ -10,7 +10,7 @@ import os
 import numpy as np
 import pytest
 
-from benchmarks.store import results
+from benchmarks.store import measuring, provenance, verifying
 from benchmarks.store.archives import (
     arrays_hash,
     map_arrays,
@@ -18,7 +18,9 @@ from benchmarks.store.archives import (
     trace_arrays,
     write_arrays,
 )
-from benchmarks.store.results import ResultRow, Store, identity, plain
+from benchmarks.store.records import plain
+from benchmarks.store.results import Store
+from benchmarks.store.rows import ResultRow, identity
 from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization, TracePoint
 from parapoint.surfaces.surface import Mesh, PointCloud
@@ -153,7 +155,7 @@ def test_a_torn_end_is_set_aside_and_said(tmp_path, caplog, tail):
     assert (tmp_path / "runs.torn").read_bytes() == tail + b"\n"
     assert (tmp_path / "runs.jsonl").read_bytes().startswith(whole)
     assert [read.seed for read in store.rows()] == [0, 1]
-    assert not list(store.faults())
+    assert not list(verifying.faults(store))
 
 
 def test_torn_ends_gather_one_after_another(tmp_path):
@@ -189,7 +191,7 @@ def test_a_damaged_line_in_the_middle_is_left_out_and_found_by_check(tmp_path, c
     (tmp_path / "runs.jsonl").write_bytes(b"".join([lines[0], b"rubbish\n", lines[1]]))
     assert [row.seed for row in store.rows()] == [0, 1]
     assert "1 damaged line" in caplog.text
-    assert list(store.faults()) == ["runs.jsonl, line 2: no whole row"]
+    assert list(verifying.faults(store)) == ["runs.jsonl, line 2: no whole row"]
 
 
 @pytest.mark.parametrize(
@@ -248,7 +250,7 @@ def test_a_full_disk_takes_no_row_and_leaves_those_before(store, monkeypatch, ke
 
 
 def test_a_folder_of_a_newer_version_is_left_alone(tmp_path):
-    (tmp_path / "environment.json").write_text(f'{{"format": {results.FORMAT + 1}, "runs": []}}')
+    (tmp_path / "environment.json").write_text(f'{{"format": {provenance.FORMAT + 1}, "runs": []}}')
     with pytest.raises(InputError, match="newer version"):
         Store(tmp_path)
 
@@ -328,63 +330,64 @@ def exchanged_surface(store, row):
 )
 def test_check_finds_what_is_wrong_with_a_file(store, damage, says):
     row = add(store)
-    assert not list(store.faults())
+    assert not list(verifying.faults(store))
     damage(store, row)
-    assert any(says in fault for fault in store.faults())
+    assert any(says in fault for fault in verifying.faults(store))
 
 
 def test_check_finds_a_row_that_was_edited(store):
     add(store)
     path = store.folder / "runs.jsonl"
     path.write_text(path.read_text().replace('"seed": 0', '"seed": 1'))
-    assert ["its id is not that of its contents" in fault for fault in store.faults()] == [True]
+    (fault,) = verifying.faults(store)
+    assert "its id is not that of its contents" in fault
 
 
 def test_metrics_are_computed_once_for_each_map(store, monkeypatch):
     row = add(store)
     add(store, status="failed", seed=1)
-    frame = store.metrics()
-    assert list(frame.columns[:6]) == list(results.IDENTITY_COLUMNS)
+    frame = measuring.metrics(store)
+    assert list(frame.columns[:6]) == list(measuring.IDENTITY_COLUMNS)
     assert frame["status"].tolist() == ["ok", "failed"]
     assert json.loads(frame["params"][0]) == {"sizes": [1, 2]}
     # A square onto itself: an isometry.
     assert frame["symmetric_dirichlet"][0] == pytest.approx(4)
     assert np.isnan(frame["symmetric_dirichlet"][1])
     assert frame["id"][0] == row.id
-    monkeypatch.setattr(results, "measured", lambda *_: pytest.fail("computed again"))
-    again = Store(store.folder).metrics()
+    monkeypatch.setattr(measuring, "measured", lambda *_: pytest.fail("computed again"))
+    again = measuring.metrics(Store(store.folder))
     assert again.equals(frame)
-    assert not store.unmeasured()
+    assert not measuring.unmeasured(store)
 
 
 def test_metrics_follow_the_map_and_their_own_source(store, monkeypatch):
     add(store, status="failed")
-    store.metrics()
+    measuring.metrics(store)
     stretched = Parameterization(FLAT.uv * [2, 1], FLAT.corners)
     row = add(store, stretched)
-    assert [found.id for found in store.unmeasured()] == [row.id]
-    assert store.metrics()["quasi_conformal_mean"][0] == pytest.approx(2)
-    monkeypatch.setattr(results, "source_hash", lambda _: "another")
-    assert [found.id for found in store.unmeasured()] == [row.id]
+    assert [found.id for found in measuring.unmeasured(store)] == [row.id]
+    assert measuring.metrics(store)["quasi_conformal_mean"][0] == pytest.approx(2)
+    monkeypatch.setattr(measuring, "source_hash", lambda _: "another")
+    assert [found.id for found in measuring.unmeasured(store)] == [row.id]
 
 
 def test_metrics_that_were_computed_elsewhere_are_taken_and_kept(store):
     rows = [add(store), add(store, seed=1)]
-    frame = store.metrics({rows[0].id: {"symmetric_dirichlet": 7.0}, rows[1].id: {}})
+    frame = measuring.metrics(store, {rows[0].id: {"symmetric_dirichlet": 7.0}, rows[1].id: {}})
     assert frame["symmetric_dirichlet"][0] == 7
     assert frame["symmetric_dirichlet"].isna()[1]
-    assert not store.unmeasured()
-    faults = list(store.faults())
+    assert not measuring.unmeasured(store)
+    faults = list(verifying.faults(store))
     assert any("symmetric_dirichlet is 7.0 in metrics.parquet" in fault for fault in faults)
 
 
 def test_a_reference_joins_the_metrics_and_asks_for_them_anew(store):
     row = add(store, Parameterization(FLAT.uv * [2, 1], FLAT.corners))
-    assert store.metrics()["artist_correlation"].isna().all()
+    assert measuring.metrics(store)["artist_correlation"].isna().all()
     store.add_reference(row.surface_hash, FLAT)
-    assert [found.id for found in store.unmeasured()] == [row.id]
+    assert [found.id for found in measuring.unmeasured(store)] == [row.id]
     # log sigma varies over the stretched map and not over the reference: no correlation.
-    assert store.metrics()["artist_correlation"].tolist() == [1]
+    assert measuring.metrics(store)["artist_correlation"].tolist() == [1]
 
 
 def test_surfaces_are_known_by_what_they_were_read_from_while_they_are_there(store):
@@ -397,7 +400,7 @@ def test_surfaces_are_known_by_what_they_were_read_from_while_they_are_there(sto
 
 def test_a_damaged_table_is_made_anew(store, caplog):
     add(store)
-    frame = store.metrics()
+    frame = measuring.metrics(store)
     (store.folder / "metrics.parquet").write_bytes(b"PAR1 rubbish")
-    assert store.metrics().equals(frame)
+    assert measuring.metrics(store).equals(frame)
     assert "damaged" in caplog.text

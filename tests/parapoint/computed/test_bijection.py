@@ -2,7 +2,7 @@ import igl
 import numpy as np
 import pytest
 
-from benchmarks.metrics.table import evaluate
+from benchmarks.metrics.evaluation import evaluate
 from parapoint.computed import bijection
 from parapoint.computed.bijection import (
     BijectionError,

@@ -3,7 +3,7 @@
 import numpy as np
 
 from benchmarks.cases import builtin
-from benchmarks.metrics.table import evaluate
+from benchmarks.metrics.evaluation import evaluate
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh
 from parapoint.unwrapping.descent import Run

@@ -1,13 +1,14 @@
 import numpy as np
 import pytest
 
+from benchmarks.rendering.camera import camera
+from benchmarks.rendering.maps import FIELDS, Map, normal_colours
+from benchmarks.rendering.scene import Scene
 from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import PointParameterization
 from parapoint.surfaces.surface import Mesh, PointCloud
-from reports.pictures import clouds, render
+from reports.pictures import clouds
 from reports.pictures.clouds import surface_points
-from reports.pictures.drawing import FIELDS, Map, normal_colours
-from reports.pictures.render import Scene
 
 from ..conftest import ball, flat, lonlat, sheet
 
@@ -37,7 +38,7 @@ def test_uv_is_interpolated_but_taken_whole_where_a_face_spans_a_seam():
 
 def drawn(mesh, result):
     scene = Scene(mesh)
-    view = scene.view(render.camera(mesh, np.eye(3)[2], np.eye(3)[1]), 64, 2)
+    view = scene.view(camera(mesh, np.eye(3)[2], np.eye(3)[1]), 64, 2)
     found = Map(mesh, result)
     colours = normal_colours(scene, view.camera)
     return view, clouds.images(view, found.uv, found.spanning, colours, FIELDS / scene.size)

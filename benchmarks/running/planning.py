@@ -1,0 +1,266 @@
+"""What a run has to do: which methods, which surfaces, and which cells have no row of use yet."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+from baselines import registry
+from benchmarks.cases import models
+from benchmarks.cases.suites import Suite
+from benchmarks.running import environment
+from benchmarks.running.cluster import WORKER_LOST
+from benchmarks.store.records import plain
+from benchmarks.store.results import Store
+from benchmarks.store.rows import MISSING, SOURCE_CHANGED, ResultRow, identity
+from parapoint.errors import InputError
+from parapoint.files.reading import faults_of, read_parameterized
+from parapoint.sources import source_hash
+
+SLOW = ("torch", "pymeshlab")
+"""Packages that are slow to import and start no thread while they are imported. The cells of a
+method that imports one are forked from a process that has it already."""
+LIMITS = {"timeout": "time_limit", "out_of_memory": "memory_limit"}
+"""For each status that a limit causes, the entry of a run's environment that holds the limit."""
+LIMIT_RAISED = 1.01
+"""Ratio to the limit of the earlier run beyond which a limit counts as raised. The memory that a
+machine reports varies a little from day to day."""
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """A method of a run.
+
+    Attributes:
+        spec: what was asked for, such as "slim(iterations=1)".
+        name: its name in the registry.
+        params: all its parameters.
+        source_hash: hash of its source.
+        modules: those of SLOW that it imports.
+    """
+
+    spec: str
+    name: str
+    params: Mapping[str, object]
+    source_hash: str
+    modules: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One case, method and seed to run.
+
+    Attributes:
+        row: its row before it has run: only the identity is filled in.
+        method: what it runs.
+        why: why it runs: "new", or what has changed since its last row.
+    """
+
+    row: ResultRow
+    method: Chosen
+    why: str
+
+
+def choice(
+    suite: Suite,
+    methods: Sequence[str] | None,
+    cases: Sequence[str] | None,
+    seeds: Sequence[int] | None,
+    plugins: Sequence[str],
+) -> tuple[Suite, list[Chosen]]:
+    """The suite that was asked for, every name in it checked, and its methods.
+
+    Raises:
+        InputError: a name is unknown, or a plugin cannot be read.
+    """
+    added = [registry.register_plugin(plugin) for plugin in plugins]
+    chosen = []
+    made = [(spec, *registry.method(spec)) for spec in dict.fromkeys(methods or suite.methods)]
+    named = {name for _, name, _ in made}
+    made += [(name, *registry.method(name)) for name in added if name not in named]
+    for spec, name, method in made:
+        params = plain(dataclasses.asdict(cast("Any", method)))
+        modules = tuple(module for module in SLOW if registry.imports(method, module))
+        chosen.append(Chosen(spec, name, params, registry.source_hash(method), modules))
+    asked = suite.cases if cases is None else cases
+    names = tuple(dict.fromkeys(models.canonical_name(case) for case in asked))
+    asked_seeds = suite.seeds if seeds is None else tuple(dict.fromkeys(seeds))
+    specs = tuple(method.spec for method in chosen)
+    return dataclasses.replace(suite, cases=names, methods=specs, seeds=asked_seeds), chosen
+
+
+def check_readable(cases: Sequence[str], store: Store) -> None:
+    """Read the models that were asked for by name, before the run writes anything.
+
+    Raises:
+        InputError: a file cannot be read, or every model is missing.
+    """
+    known, readers = store.surface_hashes(), source_hash("parapoint.files.reading")
+    missing = []
+    for case in cases:
+        try:
+            if _origin(case, readers) not in known:
+                models.load(case)
+        except models.MissingModelError as error:
+            missing.append(error)
+    if missing and len(missing) == len(cases):
+        raise missing[0]
+
+
+def surfaces(store: Store, cases: Sequence[str]) -> tuple[dict[str, str], dict[str, str]]:
+    """Store the surface of each case, with its points without noise and its own map if it has them.
+
+    Returns:
+        The hash of each case's surface, "" where the model is missing; and, for each missing case,
+        how to get the model.
+    """
+    hashes, missing = {}, {}
+    known, readers = store.surface_hashes(), source_hash("parapoint.files.reading")
+    before = dict(known)
+    for case in cases:
+        origin = _origin(case, readers)
+        if origin in known:
+            hashes[case] = known[origin]
+            continue
+        try:
+            surface = models.load(case)
+        except InputError as error:
+            missing[case] = " ".join(str(error).split())
+            hashes[case] = ""
+            continue
+        hashes[case] = store.add_surface(surface)
+        if (exact := models.exact_points(case)) is not None:
+            store.add_exact(hashes[case], exact)
+        model = models.info(case)
+        if model and model.has_uv:
+            store.add_reference(hashes[case], read_parameterized(models.path(case))[1])
+        if origin:
+            known[origin] = hashes[case]
+    if known != before:
+        store.note_surfaces(known)
+    return hashes, missing
+
+
+def _origin(case: str, readers: str) -> str:
+    """What decides the surface of a case: the content of its file, and the hash of its readers.
+
+    "" for a case of which no one file decides: surfaces made in memory, sampled clouds, and .gltf
+    files, which name other files.
+    """
+    model = models.info(case)
+    path = Path(case)
+    if model:
+        return f"{model.sha256} {readers}"
+    if models.is_made_in_memory(case) or path.suffix.lower() == ".gltf":
+        return ""
+    with faults_of(path), path.open("rb") as stream:
+        content = hashlib.file_digest(stream, "sha256").hexdigest()
+    return f"{content} {path.suffix.lower()} {readers}"
+
+
+def plan(
+    suite: Suite,
+    chosen: Sequence[Chosen],
+    hashes: Mapping[str, str],
+    store: Store,
+    here: Mapping[str, Any],
+) -> tuple[list[Cell], list[ResultRow]]:
+    """The cells that must run, and the rows of those that need not.
+
+    Args:
+        suite: the cases and the seeds.
+        chosen: the methods.
+        hashes: the hash of each case's surface, as `surfaces` returns them.
+        store: the rows so far.
+        here: the environment of this run, with its limits.
+    """
+    rows = {row.cell: row for row in store.rows()}
+    runs = store.environment()["runs"]
+    planned, kept = [], []
+    for method, blank in _blanks(suite, chosen, hashes):
+        row = rows.get(blank.cell)
+        why = "new" if row is None else changed(blank, row, store, runs, here)
+        if why:
+            planned.append(Cell(blank, method, why))
+        elif row is not None:
+            kept.append(row)
+    return planned, kept
+
+
+def _blanks(
+    suite: Suite, chosen: Sequence[Chosen], hashes: Mapping[str, str]
+) -> Iterator[tuple[Chosen, ResultRow]]:
+    """Each cell of a suite once: its method, and its row with the identity alone."""
+    seen = set()
+    for case in suite.cases:
+        for method in chosen:
+            for seed in suite.seeds:
+                row_id = identity(
+                    suite=suite.name,
+                    case=case,
+                    method=method.name,
+                    params=method.params,
+                    seed=seed,
+                    source_hash=method.source_hash,
+                    surface_hash=hashes[case],
+                )
+                if row_id in seen:
+                    continue
+                seen.add(row_id)
+                yield (
+                    method,
+                    ResultRow(
+                        id=row_id,
+                        suite=suite.name,
+                        case=case,
+                        method=method.name,
+                        params=method.params,
+                        seed=seed,
+                        source_hash=method.source_hash,
+                        surface_hash=hashes[case],
+                        status="skipped",
+                    ),
+                )
+
+
+def changed(
+    cell: ResultRow,
+    row: ResultRow,
+    store: Store,
+    runs: Sequence[Mapping[str, Any]],
+    here: Mapping[str, Any],
+) -> str:
+    """Why a cell that has a row must run again; "" if it need not.
+
+    Args:
+        cell: the cell as it would run now.
+        row: its latest row.
+        store: where its map should be.
+        runs: the environments of all runs so far.
+        here: the environment of this run, with its limits.
+    """
+    if not cell.surface_hash:  # the model cannot be had now: what is known of it stays
+        return ""
+    if row.source_hash != cell.source_hash:
+        return "method changed"
+    if row.surface_hash != cell.surface_hash:
+        return "model changed" if row.surface_hash else "model was missing"
+    if row.reason == SOURCE_CHANGED:
+        return "method changed"
+    if row.reason == WORKER_LOST:
+        return "workers were lost"
+    if row.status == "ok":
+        return "" if store.uv_path(row.id).exists() else "map missing"
+    there = runs[row.run] if 0 <= row.run < len(runs) else {}
+    if any(there.get(name) != here[name] for name in environment.MACHINE):
+        return f"{row.status} in another environment"
+    if row.reason.startswith(MISSING):
+        return "may be installed now"
+    limit = LIMITS.get(row.status)
+    if limit and here[limit] > there.get(limit, 0) * LIMIT_RAISED:
+        return "limit raised"
+    return ""

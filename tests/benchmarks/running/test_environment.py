@@ -1,0 +1,44 @@
+"""What a worker compares to know that it has the same version of the project."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import psutil
+import pytest
+
+from benchmarks.running import environment
+
+
+@pytest.mark.parametrize("place", ["parapoint/a.py", "benchmarks/room/a.py", "baselines/x/y/a.py"])
+def test_every_source_file_of_the_project_counts(tmp_path, monkeypatch, place):
+    monkeypatch.setattr(environment, "ROOT", tmp_path)
+    path = tmp_path / place
+    path.parent.mkdir(parents=True)
+    path.write_text("x = 1\n")
+    first = environment.project.__wrapped__()
+    assert environment.project.__wrapped__() == first
+    path.write_text("x = 2\n")
+    second = environment.project.__wrapped__()
+    path.rename(path.with_name("b.py"))
+    assert len({first, second, environment.project.__wrapped__()}) == 3
+
+
+@pytest.mark.parametrize(
+    ("variable", "jobs", "threads"),
+    [("", 1, 6), ("", 4, 1), ("", 3, 2), ("", 9, 1), ("3", 4, 3), ("0", 3, 2), ("many", 3, 2)],
+)
+def test_cells_share_the_cores_unless_the_user_says_how_many_threads(
+    monkeypatch, variable, jobs, threads
+):
+    monkeypatch.setattr(environment, "cores", lambda: 6)
+    monkeypatch.setenv("OMP_NUM_THREADS", variable)
+    assert environment.threads(jobs) == threads
+
+
+@pytest.mark.parametrize(("limit", "memory"), [("max", 1000), ("400\n", 400), ("4000", 1000)])
+def test_the_memory_of_a_container_is_its_limit(monkeypatch, limit, memory):
+    monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(total=1000))
+    monkeypatch.setattr(Path, "read_text", lambda _: limit)
+    assert environment.memory() == memory
