@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import math
+import shlex
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from baselines import registry
+from benchmarks.__main__ import split
 from benchmarks.store.measuring import metrics
 from benchmarks.store.results import Store
 from parapoint.console import fail, printable
 from parapoint.surfaces.parameterization import Parameterization, TracePoint
+from reports.contents import contents
+from reports.page.pages import Section
 from reports.report import write
 
 from .conftest import HAND, SLIM, Writer, flat, sheet
@@ -133,3 +139,21 @@ def test_what_is_printed_is_one_line_of_text(text: str, capsys: pytest.CaptureFi
         fail(text)
     assert capsys.readouterr().err.rstrip("\n").isprintable()
     assert printable(text + "x") != shown
+
+
+def test_the_command_of_a_suite_of_the_user_s_own_runs_its_cells(tmp_path: Path) -> None:
+    """It names the methods in place of the suite, and the command line reads it as it was meant."""
+    writer = Writer(tmp_path)
+    params = {"energy": "conformal", "iterations": 20, "tolerance": None}
+    with writer.store.writing():
+        for method, given in (("slim", params), ("lscm", {})):
+            row = writer.cell("a file.off", sheet(), method, given, status="failed", reason="no")
+            writer.store.append(dataclasses.replace(row, id=row.id[::-1], suite="custom"))
+    named, custom = (Section(tmp_path, one, (), (), ()).command for one in contents(tmp_path))
+    assert named == "python -m benchmarks run paper --cases 'a file.off' --seeds 0"
+    words = shlex.split(custom)
+    assert words[:5] == ["python", "-m", "benchmarks", "run", "--methods"]
+    specs = split(words[5])
+    assert specs == ["lscm", "slim(energy='conformal', iterations=20, tolerance=None)"]
+    assert registry.method("slim(energy='conformal', iterations=20)")[0] == "slim"
+    assert words[6:] == ["--cases", "a file.off", "--seeds", "0"]
