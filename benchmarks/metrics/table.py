@@ -1,8 +1,8 @@
-"""The registry of metrics: each stands here once, and nowhere else.
+"""The registry of metrics. Each metric has its entry here, and nowhere else.
 
 METRICS holds every name that a table, a JSON object or `metrics.parquet` may have. Each distortion
-metric stands in it twice: over all faces, and `_without_spanning` over the map restricted to the
-faces that span no seam (`benchmarks.metrics.seams`), normalized over these alone.
+metric has two entries. The second, `_without_spanning`, leaves out the faces that span a seam
+(`benchmarks.metrics.seams`) and is normalized over the others.
 
 To add a metric, write the function that computes it, and add its entry here.
 """
@@ -19,9 +19,7 @@ from benchmarks.metrics.metric import WITHOUT_SPANNING, Group, Metric
 
 
 def _entries(group: Group, part: str, *, twice: bool = False) -> Callable[..., list[Metric]]:
-    """What makes the entry of a metric from its function, its label and the fields of Metric.
-
-    The metric is named like its function.
+    """A function that makes the entries of a metric, which is named like the function it calls.
 
     Args:
         group: the table that it belongs to.

@@ -85,7 +85,7 @@ def _done(job: Job, send: int) -> Outcome:
             return run(job, send)
         case MeasureJob():
             return measure(job)
-    raise TypeError(f"{type(job).__name__} is no job to do")
+    raise TypeError(f"a cell cannot do a {type(job).__name__}")
 
 
 def _tell(send: int, message: Prepared | Outcome) -> None:

@@ -194,7 +194,7 @@ def _start(job: Job, send: int, private: list[int]) -> int:
 def _said(content: bytes | bytearray) -> tuple[str, Outcome | None]:
     """What a child sent, in whole lines: what was done to its surface, and how it ended.
 
-    Lines that are no message are left out: a method may have written into the pipe.
+    Any other line is ignored: the method may have written it into the pipe.
     """
     preprocessing, outcome = "", None
     for line in bytes(content).split(b"\n")[:-1]:

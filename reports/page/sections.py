@@ -13,6 +13,7 @@ from typing import Any
 
 from PIL import Image
 
+from benchmarks.cases.suites import SUITES
 from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
 from parapoint.surfaces.surface import Mesh
@@ -309,19 +310,21 @@ class Section:
 
     @property
     def command(self) -> str:
-        """The command that runs the suite's cells again."""
+        """The command that runs the cells again; a suite of the user's own has no name for it."""
         seeds = ",".join(str(seed) for seed in sorted({row.seed for row in self.contents.rows}))
         cases = ",".join(self.contents.cases)
-        return shlex.join(
-            ["python", "-m", "benchmarks", "run", self.name, "--cases", cases, "--seeds", seeds]
-        )
+        named = [self.name]
+        if self.name not in SUITES:
+            named = ["--methods", ",".join(map(_spec, self.contents.methods))]
+        run = ["python", "-m", "benchmarks", "run", *named]
+        return shlex.join([*run, "--cases", cases, "--seeds", seeds])
 
     @property
     def runs(self) -> list[dict[str, str]]:
         """The environments in which the cells ran, entry by entry."""
         used = {row.run for row in self.contents.rows}
         try:
-            entries = self.contents.store.environment()["runs"]
+            entries = self.contents.runs
         except InputError:
             return []
         return [
@@ -329,6 +332,12 @@ class Section:
             for number, entry in enumerate(entries)
             if number in used and isinstance(entry, Mapping)
         ]
+
+
+def _spec(label: Label) -> str:
+    """A method with all its parameters, as `python -m benchmarks run --methods` takes it."""
+    given = ", ".join(f"{name}={value!r}" for name, value in label.parameters.items())
+    return f"{label.method}({given})" if given else label.method
 
 
 def _told(value: object) -> str:

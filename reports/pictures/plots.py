@@ -40,6 +40,13 @@ Tables print smaller ones as "<0.0001" and "<0.001".
 """
 LEAST_SIZES = 5
 """Least number of different sizes through which a power law is drawn."""
+LEAST, MOST = 1e-30, 1e30
+"""Seconds and losses between which values are drawn: nobody measured a number beyond."""
+
+
+def _drawn(values: pd.Series) -> pd.Series:
+    """Which values of a column can be drawn on a logarithmic axis."""
+    return (values > LEAST) & (values < MOST)
 
 
 def losses(contents: Contents, cases: Sequence[str]) -> Figure | None:
@@ -58,8 +65,8 @@ def losses(contents: Contents, cases: Sequence[str]) -> Figure | None:
     names = [name for name in names if name not in {"iteration", "seconds"}]
     for place, (case, found) in zip(places, traces.items(), strict=True):
         for number, name in enumerate(names):
-            if name in found and (found[name] > 0).any():
-                known = found[found[name] > 0]
+            if name in found and (drawn := _drawn(found[name])).any():
+                known = found[drawn]
                 total = name in {"total", "loss"}
                 place.plot(
                     known["iteration"],
@@ -70,6 +77,7 @@ def losses(contents: Contents, cases: Sequence[str]) -> Figure | None:
                     linewidth=1.6 if total else 1.1,
                 )
         place.set_yscale("log")
+        plain_log(place.yaxis)
         place.set_title(case)
         place.set_xlabel("iteration")
     places[0].set_ylabel("loss term")
@@ -100,7 +108,10 @@ def quality_trace(contents: Contents, row: ResultRow) -> pd.DataFrame:
     records = []
     for at in result.trace:
         if at.uv is not None and len(at.uv) == len(result.uv):
-            faces = triangles(surface, Parameterization(at.uv, result.corners))
+            try:
+                faces = triangles(surface, Parameterization(at.uv, result.corners))
+            except InputError:  # a state on the way that no number can measure
+                continue
             found = face_distortion(faces)
             records.append(
                 {
@@ -137,7 +148,7 @@ def _convergence(
             if len(found) < 2:
                 value = contents.measured.loc[contents.measured["id"] == row.id, metric]
                 found = pd.DataFrame({"seconds": [row.seconds], name: [float(value.iloc[0])]})
-            known = found[np.isfinite(found[name]) & (found["seconds"] > 0)].copy()
+            known = found[np.isfinite(found[name]) & _drawn(found["seconds"])].copy()
             known[name] = known[name].clip(lower=LEAST_ANGLE if name == "angle" else None)
             if len(known):  # a map of points has neither angles nor areas of faces
                 curves.setdefault(case, []).append((label, known))
@@ -261,7 +272,7 @@ def singular_values(contents: Contents, cases: Sequence[str]) -> Figure | None:
         place.grid(visible=False, axis="y")
         place.tick_params(axis="y", length=0)
         place.set_title(case)
-        place.set_xlabel(r"$\sigma_1$ (filled), $\sigma_2$ (line)")
+        place.set_xlabel("σ1 (filled), σ2 (line)")
     return made
 
 
@@ -292,7 +303,11 @@ def cost(contents: Contents) -> Figure | None:
     place = places[0]
     for label in contents.methods:
         rows = [contents.shown(case, label) for case in sizes]
-        points = [(sizes[row.case], row.seconds) for row in rows if row and row.seconds]
+        points = [
+            (sizes[row.case], row.seconds)
+            for row in rows
+            if row and row.seconds and LEAST < row.seconds < MOST
+        ]
         if not points:
             continue
         style = look(contents, label)

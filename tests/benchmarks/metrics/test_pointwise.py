@@ -38,6 +38,15 @@ def test_a_similarity_is_perfect(scale):
     assert values["spanning_point_fraction"] == 0
 
 
+@pytest.mark.parametrize("stretch", [1.0, 3.0])
+def test_scan_lines_are_judged_across_the_lines(stretch):
+    """Lines 20 times as far apart as their points: the eight nearest all lie on one."""
+    x, y = np.meshgrid(np.arange(60.0), 20 * np.arange(6.0))
+    points = np.stack([x.ravel(), y.ravel()], axis=1)
+    values = scores(points, points * [1, stretch])
+    assert_allclose(values["local_quasi_conformal_mean"], stretch, atol=1e-6)
+
+
 @pytest.mark.parametrize("k", [2.0, 7.0])
 def test_a_stretch_is_measured_in_any_plane(k):
     points = plane()
