@@ -82,14 +82,14 @@ def _seeds(_: click.Context, __: click.Parameter, text: str | None) -> list[int]
 )
 @click.option(
     "--timeout",
-    type=click.FloatRange(0, min_open=True),
+    type=float,
     default=1800,
     show_default=True,
     help="Seconds a cell may take.",
 )
 @click.option(
     "--memory",
-    type=click.FloatRange(0, min_open=True),
+    type=float,
     help="GB a cell may hold.  [default: four fifths of the machine's, / jobs]",
 )
 @click.option("--out", type=click.Path(path_type=Path), default="results", show_default=True)
@@ -169,7 +169,7 @@ def check(ctx: click.Context, folder: Path) -> None:
     faults = 0
     for fault in verifying.faults(store):
         faults += 1
-        print(fault)
+        print(console.printable(fault, console.LONGEST_MESSAGE))
     rows = store.rows()
     maps = sum(row.status == "ok" for row in rows)
     print(f"{len(rows)} cells, {maps} maps: {faults or 'no'} fault{'s' * (faults != 1)}")

@@ -16,7 +16,13 @@ import numpy.typing as npt
 from parapoint import fitting, saving
 from parapoint.errors import InputError
 from parapoint.fitting import COMPONENTS, Fitted, Progress, Session, SurfaceMap
-from parapoint.parameters import check_choice, check_number, check_whole
+from parapoint.parameters import (
+    LARGEST_SEED,
+    LONGEST_SECONDS,
+    check_choice,
+    check_number,
+    check_whole,
+)
 from parapoint.surfaces.dimension import checked_dimension
 from parapoint.surfaces.frame import Frame
 from parapoint.surfaces.gridding import gridded
@@ -80,9 +86,9 @@ class Estimator(ABC):
             InputError: one is not as its docstring says.
         """
         check_choice("components", self.components, COMPONENTS)
-        check_whole("seed", self.seed, 0)
+        check_whole("seed", self.seed, 0, LARGEST_SEED)
         if self.time_budget is not None:
-            check_number("time_budget", self.time_budget, above=True)
+            check_number("time_budget", self.time_budget, most=LONGEST_SECONDS, above=True)
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:  # noqa: ARG002 (scikit-learn's name)
         """The parameters by name."""

@@ -19,6 +19,7 @@ from benchmarks.metrics.table import METRICS
 from benchmarks.store import measuring
 from benchmarks.store.results import Store
 from benchmarks.store.rows import ResultRow
+from parapoint.console import LONGEST_MESSAGE, printable
 from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh, PointCloud
@@ -208,6 +209,12 @@ class Contents:
     is_large: bool
 
     @cached_property
+    def runs(self) -> list[dict[str, Any]]:
+        """The environment of each run of the folder, its texts printable."""
+        found: list[dict[str, Any]] = readable(self.store.environment()["runs"])
+        return found
+
+    @cached_property
     def cases(self) -> list[str]:
         """The models, in the order in which they ran."""
         return list(dict.fromkeys(row.case for row in self.rows))
@@ -330,6 +337,33 @@ def number(record: Mapping[str, object] | None, name: str) -> float | None:
     return float(value)
 
 
+def _readable_row(row: ResultRow) -> ResultRow:
+    """The row with every text in it printable (`parapoint.console.printable`)."""
+    return dataclasses.replace(
+        row,
+        suite=printable(row.suite),
+        case=printable(row.case),
+        method=printable(row.method),
+        params=readable(row.params),
+        reason=printable(row.reason, LONGEST_MESSAGE),
+        output="\n".join(printable(line, LONGEST_MESSAGE) for line in row.output.splitlines()),
+        preprocessing=printable(row.preprocessing),
+        report=readable(row.report),
+        host=printable(row.host),
+    )
+
+
+def readable(value: Any) -> Any:
+    """A value out of JSON with every text in it printable."""
+    if isinstance(value, str):
+        return printable(value)
+    if isinstance(value, list):
+        return [readable(entry) for entry in value]
+    if isinstance(value, Mapping):
+        return {printable(str(key)): readable(entry) for key, entry in value.items()}
+    return value
+
+
 def contents(folder: Path) -> list[Contents]:
     """What `folder` holds, suite by suite.
 
@@ -339,7 +373,7 @@ def contents(folder: Path) -> list[Contents]:
     if not folder.exists():
         raise InputError(f"{folder}: no such folder; `python -m benchmarks run` makes one")
     store = Store(folder)
-    rows = store.rows()
+    rows = [_readable_row(row) for row in store.rows()]
     if not rows:
         raise InputError(
             f"{folder} holds no results: it has no readable line in runs.jsonl; "
@@ -352,9 +386,11 @@ def contents(folder: Path) -> list[Contents]:
         own = tuple(row for row in rows if row.suite == suite)
         by_key = labels(own)
         by_id = {row.id: by_key[_key(row)] for row in own}
+        cases = {row.id: row.case for row in own}
         times = {name: {row.id: getattr(row, name) for row in own} for name in TIMES}
         part = frame[frame["id"].isin(by_id)].drop(columns=["method", "params", "suite"])
         part = part.assign(
+            case=part["id"].map(cases),
             label=part["id"].map(lambda key, by_id=by_id: by_id[key].short),
             **{name: part["id"].map(of).astype("float64") for name, of in times.items()},
         )

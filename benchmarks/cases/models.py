@@ -14,11 +14,12 @@ Files come from a local mirror, if PARAPOINT_DATA names one. Otherwise they are 
 from __future__ import annotations
 
 import difflib
+import functools
 import json
 import os
 import re
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -310,6 +311,29 @@ def cache_folder() -> Path:
     return Path(platformdirs.user_cache_dir("parapoint", appauthor=False))
 
 
+def _bound(model: Model, response: Any, **_: Any) -> None:
+    """Let a response hand out no more bytes than the model's file has.
+
+    Raises:
+        InputError: while it is read: there are more.
+    """
+    content = response.iter_content
+
+    def bounded(*arguments: Any, **options: Any) -> Iterator[bytes]:
+        read = 0
+        for chunk in content(*arguments, **options):
+            read += len(chunk)
+            if read > model.size:
+                response.close()
+                raise InputError(
+                    f"{model.name}: the file at {model.url} is not the registered one: "
+                    f"it has more than {model.size} bytes"
+                )
+            yield chunk
+
+    response.iter_content = bounded
+
+
 def _downloaded(model: Model) -> Path:
     """The model's file in the cache; it is downloaded if it is not there."""
     from requests import RequestException
@@ -327,9 +351,13 @@ def _downloaded(model: Model) -> Path:
             path=file.parent,
             fname=file.name,
             downloader=pooch.HTTPDownloader(
-                progressbar=sys.stderr.isatty(), timeout=(CONNECT_SECONDS, READ_SECONDS)
+                progressbar=sys.stderr.isatty(),
+                timeout=(CONNECT_SECONDS, READ_SECONDS),
+                hooks={"response": functools.partial(_bound, model)},
             ),
         )
+    except InputError:  # larger than registered
+        raise
     except HTTPError as error:
         raise _missing_model(model, file, str(error)) from error
     except RequestException as error:

@@ -19,6 +19,7 @@ from rich.text import Text
 
 from benchmarks.running.planning import Cell
 from benchmarks.running.runner import Progress, Summary
+from parapoint.console import LONGEST_MESSAGE, printable
 
 if TYPE_CHECKING:
     from benchmarks.store.rows import ResultRow
@@ -66,7 +67,8 @@ class Display(Progress):
     def planned(self, summary: Summary) -> None:
         """Print what the run is going to do, and why."""
         self._bar.update(self._task, total=len(summary.planned))
-        print(plan(summary), flush=True)
+        for line in plan(summary).split("\n"):
+            _say(line)
 
     def started(self, cell: Cell) -> None:
         """Show that a cell is running."""
@@ -78,7 +80,11 @@ class Display(Progress):
         self._running.pop(row.id, None)
         self._bar.advance(self._task)
         if row.status in BAD and not self._bar.disable:
-            self._bar.console.print(escape(f"{cell.row.case} {cell.method.spec}: {ending(row)}"))
+            self._bar.console.print(
+                escape(
+                    printable(f"{cell.row.case} {cell.method.spec}: {ending(row)}", LONGEST_MESSAGE)
+                )
+            )
 
     def measured(self, done: int, total: int) -> None:
         """Show how many of the maps have been measured."""
@@ -89,7 +95,7 @@ class Display(Progress):
         now = time.monotonic()
         running = (f"{name} {now - began:.0f} s" for name, began in self._running.values())
         if self._running:
-            self._bar.update(self._task, description=escape(", ".join(running)))
+            self._bar.update(self._task, description=escape(printable(", ".join(running))))
 
 
 def ending(row: ResultRow) -> str:
@@ -125,7 +131,7 @@ def print_summary(summary: Summary) -> None:
     for method, rows in _by_method(summary).items():
         counts = Counter[str](row.status for row in rows)
         table.add_row(
-            Text(method),
+            Text(printable(method)),
             *(str(counts[status]) for status in used),
             _median([row.seconds for row in rows], ".3g"),
             _median([row.peak_memory_mb for row in rows], ".0f"),
@@ -133,20 +139,25 @@ def print_summary(summary: Summary) -> None:
     print_table(table)
     bad = [row for row in summary.rows if row.status in BAD]
     for row in bad[:LISTED]:
-        print(f"{row.case}, {summary.spec(row)}: {ending(row)}")
+        _say(f"{row.case}, {summary.spec(row)}: {ending(row)}")
     if len(bad) > LISTED:
         print(f"and {len(bad) - LISTED} more that did not end well: see runs.jsonl")
     names = {row.id: f"{row.case}, {summary.spec(row)}" for row in summary.rows}
     for row_id, reason in summary.unmeasured.items():
-        print(f"{names.get(row_id, row_id)}: no metrics: {reason}")
+        _say(f"{names.get(row_id, row_id)}: no metrics: {reason}")
     for case, reason in summary.missing.items():
-        print(f"{case} is left out: {reason}")
+        _say(f"{case} is left out: {reason}")
     if summary.ran:
         harness = max(0.0, summary.seconds - summary.method_seconds)
         print(
             f"{len(summary.ran)} cells in {summary.seconds:.1f} s, "
             f"of which the harness took {harness:.1f} s"
         )
+
+
+def _say(line: str) -> None:
+    """Print a line with names from elsewhere in it."""
+    print(printable(line, LONGEST_MESSAGE), flush=True)
 
 
 def print_table(table: Table) -> None:

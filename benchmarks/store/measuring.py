@@ -62,7 +62,8 @@ def metrics(
         else:
             given = (measured_elsewhere or {}).get(row.id)
             values = row_metrics(store, row) if given is None else dict(given)
-        cell = (row.suite, row.case, row.method, json.dumps(row.params), row.seed, row.status)
+        names = (_encodable(name) for name in (row.suite, row.case, row.method))
+        cell = (*names, json.dumps(row.params), row.seed, row.status)
         start = dict(zip(IDENTITY_COLUMNS, cell, strict=True))
         records.append({**start, **values, "id": row.id, "metrics_key": key})
     extra = {name for record in records for name in record}
@@ -72,6 +73,11 @@ def metrics(
     frame = frame.astype(dict.fromkeys(numbers, "float64") | {"seed": "int64"})
     _write(store, frame)
     return frame
+
+
+def _encodable(name: str) -> str:
+    """A name as UTF-8 can hold it: that of a file may have bytes that are no text."""
+    return name.encode(errors="backslashreplace").decode()
 
 
 def unmeasured(store: Store) -> list[ResultRow]:

@@ -106,7 +106,8 @@ def row_of(line: bytes) -> ResultRow | None:
     except ValueError:
         return None
     names = (row.id, row.surface_hash) if row.surface_hash else (row.id,)
-    return row if all(HASH.fullmatch(name) for name in names) else None
+    named = all(HASH.fullmatch(name) for name in names)
+    return row if named and 0 <= row.seed < 2**63 else None
 
 
 class RowFile:

@@ -268,7 +268,7 @@ def welch(first: Floats, second: Floats) -> float:
 
 def _environment(suites: Sequence[Contents]) -> dict[str, str]:
     """What the cells of a folder ran on: commit, machine, versions; all values where several."""
-    runs = suites[0].store.environment()["runs"]
+    runs = suites[0].runs
     used = {row.run for suite in suites for row in suite.rows}
     told: dict[str, set[str]] = {}
     for number, run in enumerate(runs):

@@ -18,6 +18,7 @@ from matplotlib import colormaps
 from matplotlib.colors import to_hex
 from PIL import Image
 
+from benchmarks.cases.suites import SUITES
 from benchmarks.rendering.maps import ANGLE_SCALE, AREA_SCALE
 from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
@@ -102,6 +103,12 @@ class Card:
     pictures: Mapping[str, str]
     numbers: Sequence[Number]
     exports: Sequence[tuple[str, str]]
+
+
+def _spec(label: Label) -> str:
+    """A method with all its parameters, as `python -m benchmarks run --methods` takes it."""
+    given = ", ".join(f"{name}={value!r}" for name, value in label.parameters.items())
+    return f"{label.method}({given})" if given else label.method
 
 
 @dataclass(frozen=True)
@@ -293,19 +300,21 @@ class Section:
 
     @property
     def command(self) -> str:
-        """The command that runs the suite's cells again."""
+        """The command that runs the cells again; a suite of the user's own has no name for it."""
         seeds = ",".join(str(seed) for seed in sorted({row.seed for row in self.contents.rows}))
         cases = ",".join(self.contents.cases)
-        return shlex.join(
-            ["python", "-m", "benchmarks", "run", self.name, "--cases", cases, "--seeds", seeds]
-        )
+        named = [self.name]
+        if self.name not in SUITES:
+            named = ["--methods", ",".join(map(_spec, self.contents.methods))]
+        run = ["python", "-m", "benchmarks", "run", *named]
+        return shlex.join([*run, "--cases", cases, "--seeds", seeds])
 
     @property
     def runs(self) -> list[dict[str, str]]:
         """The environments in which the cells ran, entry by entry."""
         used = {row.run for row in self.contents.rows}
         try:
-            entries = self.contents.store.environment()["runs"]
+            entries = self.contents.runs
         except InputError:
             return []
         return [

@@ -295,7 +295,7 @@ def heat_maps(contents: Contents, case: str, pictures: Path) -> Figure:
     width, height = made.get_size_inches()
     for number, (scale, title, ticks) in enumerate(
         (
-            (ANGLE_SCALE, "stretch $\\sigma_1/\\sigma_2$", ("1", "2", "4 or more")),
+            (ANGLE_SCALE, "stretch σ1/σ2", ("1", "2", "4 or more")),
             (AREA_SCALE, "UV area / 3D area", ("1/8 or less", "1", "8 or more")),
         )
     ):

@@ -32,6 +32,14 @@ from reports.pictures.style import (
 )
 from reports.ranking import may_rank
 
+LEAST, MOST = 1e-30, 1e30
+"""What is drawn on a logarithmic axis lies between: beyond is no number that anybody measured."""
+
+
+def _drawn(values: pd.Series) -> pd.Series:
+    """Which values of a column can be drawn on a logarithmic axis."""
+    return (values > LEAST) & (values < MOST)
+
 
 def losses(contents: Contents, cases: Sequence[str]) -> Figure | None:
     """Loss terms of ParaPoint against iterations, model by model."""
@@ -49,8 +57,8 @@ def losses(contents: Contents, cases: Sequence[str]) -> Figure | None:
     names = [name for name in names if name not in {"iteration", "seconds"}]
     for place, (case, found) in zip(places, traces.items(), strict=True):
         for number, name in enumerate(names):
-            if name in found and (found[name] > 0).any():
-                known = found[found[name] > 0]
+            if name in found and (drawn := _drawn(found[name])).any():
+                known = found[drawn]
                 total = name in {"total", "loss"}
                 place.plot(
                     known["iteration"],
@@ -61,6 +69,7 @@ def losses(contents: Contents, cases: Sequence[str]) -> Figure | None:
                     linewidth=1.6 if total else 1.1,
                 )
         place.set_yscale("log")
+        plain_log(place.yaxis)
         place.set_title(case)
         place.set_xlabel("iteration")
     places[0].set_ylabel("loss term")
@@ -91,7 +100,10 @@ def quality_trace(contents: Contents, row: ResultRow) -> pd.DataFrame:
     records = []
     for at in result.trace:
         if at.uv is not None and len(at.uv) == len(result.uv):
-            faces = triangles(surface, Parameterization(at.uv, result.corners))
+            try:
+                faces = triangles(surface, Parameterization(at.uv, result.corners))
+            except InputError:  # a state on the way that no number can measure
+                continue
             found = face_distortion(faces)
             records.append(
                 {
@@ -128,7 +140,7 @@ def _convergence(
             if len(found) < 2:
                 value = contents.measured.loc[contents.measured["id"] == row.id, metric]
                 found = pd.DataFrame({"seconds": [row.seconds], name: [float(value.iloc[0])]})
-            known = found[np.isfinite(found[name]) & (found["seconds"] > 0)]
+            known = found[np.isfinite(found[name]) & _drawn(found["seconds"])]
             if len(known):  # a map of points has neither angles nor areas of faces
                 curves.setdefault(case, []).append((label, known))
     if not traced:
@@ -223,7 +235,7 @@ def singular_values(contents: Contents, cases: Sequence[str]) -> Figure | None:
         place.grid(visible=False, axis="y")
         place.tick_params(axis="y", length=0)
         place.set_title(case)
-        place.set_xlabel(r"$\sigma_1$ (filled), $\sigma_2$ (line)")
+        place.set_xlabel("σ1 (filled), σ2 (line)")
     return made
 
 
@@ -254,7 +266,11 @@ def cost(contents: Contents) -> Figure | None:
     place = places[0]
     for label in contents.methods:
         rows = [contents.shown(case, label) for case in sizes]
-        points = [(sizes[row.case], row.seconds) for row in rows if row and row.seconds]
+        points = [
+            (sizes[row.case], row.seconds)
+            for row in rows
+            if row and row.seconds and LEAST < row.seconds < MOST
+        ]
         if not points:
             continue
         style = look(contents, label)

@@ -19,7 +19,7 @@ from reports.contents import Contents, Label
 
 STYLE: dict[Any, Any] = {
     "font.family": "STIXGeneral",
-    "mathtext.fontset": "stix",
+    "text.parse_math": False,
     "font.size": 8.5,
     "axes.titlesize": 9,
     "axes.labelsize": 8.5,
@@ -39,7 +39,8 @@ STYLE: dict[Any, Any] = {
     "savefig.dpi": 220,
     "svg.hashsalt": "parapoint",
 }
-"""The fonts come with matplotlib; the text width of a paper is `WIDTH`."""
+"""The fonts come with matplotlib, and no name with dollars is read as a formula. The text width of
+a paper is `WIDTH`."""
 
 WIDTH = 7.0
 """Width of a figure, inches."""
@@ -181,12 +182,11 @@ def plain_log(axis: Axis) -> None:
 
 
 def _plain(value: float) -> str:
-    """A number, as a power of ten below 0.0001."""
+    """A number, with an exponent below 0.0001."""
     if value >= 1e-4:
         return f"{value:,g}"
     mantissa, exponent = f"{value:.0e}".split("e")
-    factor = "" if mantissa == "1" else rf"{mantissa} \cdot "
-    return f"${factor}10^{{{int(exponent)}}}$"
+    return f"{mantissa}e{int(exponent)}"
 
 
 def legend_below(made: Figure, places: Sequence[Axes]) -> None:

@@ -144,7 +144,7 @@ def markdown(table: Table) -> str:
     """The table as Markdown; best in bold, second in italics."""
 
     def escaped(text: str) -> str:
-        return re.sub(r"([\\`*_{}\[\]<>|#])", r"\\\1", " ".join(text.split()))
+        return re.sub(r"([\\`*_{}\[\]<>|#$~&])", r"\\\1", " ".join(text.split()))
 
     heads = [
         f"{column.group}: {column.head}" if column.group else column.head
@@ -175,12 +175,18 @@ def comma_separated(table: Table) -> str:
     """The table as CSV: keys as heads, numbers in full, every row complete."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([column.key for column in table.columns])
+    writer.writerow([_plain(column.key) for column in table.columns])
     for block in table.blocks:
         for row in block:
-            values = [_full(row, column) for column in table.columns]
-            writer.writerow(["" if value is None else value for value in values])
+            writer.writerow([_plain(_full(row, column)) for column in table.columns])
     return out.getvalue()
+
+
+def _plain(value: Value) -> Value:
+    """A value that no spreadsheet computes: text that begins as a formula does gets a quote."""
+    if isinstance(value, str) and value.lstrip().startswith(("=", "+", "-", "@")):
+        return f"'{value}"
+    return "" if value is None else value
 
 
 def _full(row: Mapping[str, Value], column: Column) -> Value:

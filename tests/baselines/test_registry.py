@@ -221,7 +221,7 @@ def test_installed_package_that_cannot_be_imported_says_so(tmp_path, monkeypatch
     monkeypatch.syspath_prepend(tmp_path)
     registry._installed.cache_clear()
     assert "broken" in registry.names()
-    with pytest.raises(InputError, match=r"broken .* cannot be imported"):
+    with pytest.raises(InputError, match=r"broken .* does not run: ModuleNotFoundError"):
         registry.method("broken")
     registry._installed.cache_clear()
 
