@@ -8,7 +8,7 @@ from dataclasses import asdict, is_dataclass
 from typing import Any, cast
 
 import numpy as np
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, cKDTree
 
 from parapoint.method import REQUIREMENTS, Method, MissingError, UnsupportedError
 from parapoint.surfaces.cutting import cut_along, disk_cut
@@ -17,6 +17,13 @@ from parapoint.surfaces.preparation import prepared
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, PointCloud, Surface
 
 SEED = 7
+SIMILARITIES = ((5e5, 1e-6), (6e6, 1e6))
+"""Shifts, in sizes of the surface, and scales of the similar surfaces that are tried."""
+ALIKE = 1e-3
+"""Most that a measure of the map of a similar surface differs by; more only if seeds do."""
+OTHER_SEEDS = (1, 2, 3)
+SEEDS_APART = 2.0
+"""The range of the measures over a few seeds counts so many times: there are more seeds."""
 """Seed of the methods and of the surfaces that they are checked on."""
 THINNEST = 1e-9
 """Ratio of a map's width to its length up to which it counts as collapsed to a line."""
@@ -37,6 +44,8 @@ def check_method(method: Method, surface: Surface | None = None) -> None:
       corners are in the order of the mesh.
     - The same seed gives the same map, bit by bit, unless the method says that it is not
       `deterministic`. The arrays of the surface do not change.
+    - A similar surface, far from the origin and in another unit, has a map alike: what the map
+      does to lengths and areas differs by ALIKE at most, or by what seeds make it differ.
     - A trace counts up in steps and seconds, and its maps are finite and of the result's shape.
 
     Args:
@@ -66,6 +75,8 @@ def check_method(method: Method, surface: Surface | None = None) -> None:
             maps = [_check_run(method, part, where) for part in preparation.parts]
             if not checked and getattr(method, "deterministic", True):
                 _check_repeat(method, preparation.parts[0], maps[0], where)
+            if not checked:
+                _check_similar(method, preparation.parts[0], maps[0], where)
         except MissingError:
             raise
         except UnsupportedError as error:
@@ -271,3 +282,66 @@ def _promise(kept: bool, otherwise: str) -> None:
     """
     if not kept:
         raise BrokenPromiseError(otherwise)
+
+
+def _check_similar(
+    method: Method,
+    surface: Surface,
+    first: Parameterization | PointParameterization,
+    where: str,
+) -> None:
+    """The map of a similar surface is alike, wherever it lies, in any unit."""
+    known = measures(surface, first)
+    for shift, scale in SIMILARITIES:
+        what = f"{where}: moved by {shift:g} times its size and scaled by {scale:g}, it"
+        try:
+            found = method.parameterize(similar(surface, shift, scale), seed=SEED)
+        except MissingError:
+            raise
+        except Exception as error:
+            raise BrokenPromiseError(f"{what} cannot be mapped: {error}") from error
+        apart = float(np.abs(measures(surface, found) - known).max())
+        if apart > ALIKE:
+            others = [method.parameterize(surface, seed=seed) for seed in OTHER_SEEDS]
+            by_seed = np.ptp([known, *(measures(surface, other) for other in others)], axis=0)
+            _promise(
+                apart <= SEEDS_APART * float(by_seed.max()),
+                f"{what} has another map: lengths or areas differ by {apart:.2g}",
+            )
+
+
+def similar(surface: Surface, shift: float, scale: float) -> Surface:
+    """The surface moved by so many times its size along each axis, then scaled."""
+    points = surface.vertices if isinstance(surface, Mesh) else surface.points
+    moved = scale * (points + shift * float(np.ptp(points, axis=0).max()))
+    if isinstance(surface, Mesh):
+        return Mesh(moved, surface.faces, surface.seams)
+    return PointCloud(moved, surface.normals, surface.dropped, surface.attributes)
+
+
+def measures(surface: Surface, result: Parameterization | PointParameterization) -> FloatArray:
+    """(2,) how unevenly a map changes lengths and signed areas, whatever the unit of either side.
+
+    The sums of absolute differences between the shares that edges, and faces, have of the whole on
+    the surface and in the plane: 0 where all shares stay, 2 at most but for flipped faces. The
+    edges of a cloud lead to its six nearest neighbours; it has no faces.
+    """
+    if isinstance(result, PointParameterization):
+        assert isinstance(surface, PointCloud)
+        near = cKDTree(surface.points).query(surface.points, 7)[1][:, 1:]
+        lengths = [
+            np.linalg.norm(of[near] - of[:, None], axis=2) for of in (surface.points, result.uv)
+        ]
+        return np.array([_share_difference(*lengths), 0.0])
+    assert isinstance(surface, Mesh)
+    corners = surface.vertices[surface.faces], result.uv[result.corners]
+    lengths = [np.linalg.norm(of - np.roll(of, 1, axis=1), axis=2) for of in corners]
+    (ax, ay), (bx, by) = ((corners[1][:, k] - corners[1][:, 0]).T for k in (1, 2))
+    turned = ax * by - ay * bx
+    turned *= np.sign(turned.sum()) or 1.0
+    return np.array([_share_difference(*lengths), _share_difference(surface.face_areas, turned)])
+
+
+def _share_difference(one: FloatArray, other: FloatArray) -> float:
+    total = np.abs(other).sum()
+    return float(np.abs(one / one.sum() - other / (total or 1.0)).sum())
