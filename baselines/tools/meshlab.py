@@ -72,7 +72,7 @@ def disk_map(surface: Surface, name: str) -> Parameterization:
     """
     disk = domain(surface)
     check_triangles(disk.vertices, disk.faces)
-    made = filtered(in_unit(disk.vertices), disk.faces, name)
+    made = filtered(in_unit(disk.vertices, disk.faces), disk.faces, name)
     return Parameterization(scaled(disk, made.current_mesh().vertex_tex_coord_matrix()), disk.faces)
 
 
@@ -108,7 +108,7 @@ class MeshLabVoronoi:
                 f"needs at least {2 * self.regions} vertices for {self.regions} regions; "
                 f"there are {len(surface.vertices)}"
             )
-        unit = Mesh(in_unit(surface.vertices), surface.faces)
+        unit = Mesh(in_unit(surface.vertices, surface.faces), surface.faces)
         made = filtered(
             unit.vertices,
             unit.faces,
@@ -147,7 +147,7 @@ class MeshLabTriangles:
         if not isinstance(surface, Mesh):
             raise UnsupportedError("needs faces; the surface is a point cloud")
         made = filtered(
-            in_unit(surface.vertices),
+            in_unit(surface.vertices, surface.faces),
             surface.faces,
             "compute_texcoord_parametrization_triangle_trivial_per_wedge",
             textdim=self.page_size,

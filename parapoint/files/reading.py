@@ -226,18 +226,18 @@ def _mesh(content: Content) -> tuple[Mesh, IntArray]:
         face = int(np.flatnonzero(small)[0])
         raise InputError(f"face {face} has {int(content.sizes[face])} corners; it needs three")
     vertices = read_only(content.vertices, np.float64, "vertices", 3)
-    size = float(np.ptp(vertices / 2, axis=0).max(initial=0)) * 2
-    if size and not SMALLEST_MESH < size < LARGEST_MESH:
-        raise InputError(
-            f"its size is {size:g}, and areas of it are beyond a float64: scale it to between "
-            f"{SMALLEST_MESH:g} and {LARGEST_MESH:g}"
-        )
     outside = (content.corners < 0) | (content.corners >= len(vertices))
     if outside.any():
         corner = int(np.flatnonzero(outside)[0])
         face = int(np.searchsorted(np.cumsum(content.sizes), corner, side="right"))
         raise InputError(
             f"face {face} has a vertex index out of range; the file has {len(vertices)} vertices"
+        )
+    size = float(np.ptp(vertices[content.corners] / 2, axis=0).max(initial=0)) * 2
+    if size and not SMALLEST_MESH < size < LARGEST_MESH:
+        raise InputError(
+            f"its size is {size:g}, and areas of it are beyond a float64: scale it to between "
+            f"{SMALLEST_MESH:g} and {LARGEST_MESH:g}"
         )
     rows = triangle_rows(vertices, content.sizes, content.corners)
     return Mesh(vertices, content.corners[rows]), rows
