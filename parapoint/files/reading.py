@@ -175,7 +175,7 @@ def faults_of(path: Path) -> Iterator[None]:
 
 
 def read_point_map(path: str | Path) -> tuple[PointCloud, PointParameterization]:
-    """The points in a PLY (with u and v) or NPZ file (points, uv), and their map.
+    """The points in a PLY (u and v), NPZ (points, uv) or OBJ file (a vt for each v), and their map.
 
     Raises:
         InputError: as for `read_surface`; the file has faces or no UV; a row of them is neither
@@ -189,8 +189,13 @@ def read_point_map(path: str | Path) -> tuple[PointCloud, PointParameterization]
         uv = content.attributes.get("uv")
         if uv is None and {"u", "v"} <= set(content.attributes):
             uv = np.stack([content.attributes[name] for name in "uv"], axis=1)
+        if uv is None and content.uv is not None and len(content.uv) == len(content.vertices):
+            uv = content.uv
         if uv is None:
-            raise InputError("has no array 'uv'; a point map has points and uv")
+            raise InputError(
+                "has no uv for each point; a map of points is u and v in PLY, the array 'uv' in "
+                "NPZ, and as many vt as v lines in OBJ"
+            )
         return PointCloud(content.vertices), PointParameterization(uv)
 
 
