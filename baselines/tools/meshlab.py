@@ -20,6 +20,11 @@ pymeshlab = optional(
 )
 
 
+failed: list[Any] = []
+"""Mesh sets of which a filter failed. They are never destroyed, as pymeshlab then damages memory of
+the process: whatever reads texture coordinates later crashes (seen in 2025.7)."""
+
+
 def filtered(vertices: FloatArray, faces: IntArray, name: str, **options: object) -> Any:
     """The MeshSet of these vertices and faces after a filter that makes texture coordinates.
 
@@ -34,6 +39,7 @@ def filtered(vertices: FloatArray, faces: IntArray, name: str, **options: object
     try:
         meshes.apply_filter(name, **options)
     except pymeshlab.PyMeshLabException as error:
+        failed.append(meshes)
         raise FlatteningError(" ".join(str(error).split())) from None
     return meshes
 
