@@ -19,7 +19,7 @@ from benchmarks.running.tasks import Outcome, Prepared, Ready, RunJob, from_json
 from benchmarks.store.archives import read_map, read_surface
 from benchmarks.store.measuring import measured
 from benchmarks.store.results import Store
-from benchmarks.store.rows import SOURCE_CHANGED
+from benchmarks.store.rows import MACHINE, SOURCE_CHANGED
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization
 from parapoint.surfaces.surface import Mesh, PointCloud
 from parapoint.testing import sample_surfaces
