@@ -29,10 +29,10 @@ PR_SET_PDEATHSIG = 1
 PR_SET_CHILD_SUBREAPER = 36
 
 
-def adopt_orphans() -> None:
-    """Make this process the parent of all processes below it whose own parent ends."""
+def adopt_orphans(*, is_parent: bool = True) -> None:
+    """Make this process the parent of all processes below it whose own parent ends, or no more."""
     if FORKS:
-        ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+        ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, int(is_parent), 0, 0, 0)
 
 
 def end_with(parent: int) -> None:

@@ -180,6 +180,7 @@ class Local:
         for slot in self.slots:
             slot.close()
         end_orphans(self.others)
+        adopt_orphans(is_parent=False)
         self.selector.close()
         scratch.remove(self.folder)
 
