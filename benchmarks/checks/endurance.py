@@ -41,7 +41,7 @@ from parapoint import console
 from parapoint.testing import irregular_disk
 
 PLUGIN = f"{instant.__file__}:Instant"
-TIMING = ("seconds", "cpu_seconds", "peak_memory_mb", "run")
+TIMING = ("seconds", "cpu_seconds", "load", "peak_memory_mb", "run")
 """What differs between two rows of the same cell."""
 CASES = ("half_cylinder", "saddle@noise=0")
 """A mesh and a cloud, for methods of either."""

@@ -24,6 +24,7 @@ from typing import Never
 import numpy as np
 
 from baselines import registry
+from benchmarks.running.environment import load
 from benchmarks.running.tasks import Job, MeasureJob, Outcome, Prepared, RunJob, from_json, to_json
 from benchmarks.store.archives import (
     arrays_hash,
@@ -122,6 +123,7 @@ def run(job: RunJob, send: int) -> Outcome:
         _tell(send, Prepared(preparation.steps))
         if hasattr(method, "preload"):
             method.preload()
+        busy = load()
         before, wall = os.times(), time.perf_counter()
         maps = preparation.maps(method, job.seed)
         wall, after = time.perf_counter() - wall, os.times()
@@ -133,7 +135,8 @@ def run(job: RunJob, send: int) -> Outcome:
         return ended(*failure(error))
     _end_fork(own)
     processor = sum(after[:4]) - sum(before[:4])
-    ended = functools.partial(ended, seconds=wall, cpu_seconds=processor)
+    busy = max((one for one in (busy, load()) if one is not None), default=None)
+    ended = functools.partial(ended, seconds=wall, cpu_seconds=processor, load=busy)
     for surface, part in zip(preparation.parts, maps, strict=True):
         if reason := fault(surface, part):
             return ended("failed", reason)

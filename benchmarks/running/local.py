@@ -75,7 +75,7 @@ class _Slot:
         self.printed = bytearray()
         self.ready = False
         self.task: Task | None = None
-        self.folder = Path()
+        self.folder: Path | None = None  # never the working directory: `_end` removes it
         self.number = 0
         self.started = math.inf
 
@@ -284,13 +284,14 @@ class Local:
 
     def _end(self, slot: _Slot, outcome: Outcome) -> None:
         """Hand on the outcome of the task that a supervisor has done."""
-        task = slot.task
+        task, folder = slot.task, slot.folder
         assert task is not None
+        assert folder is not None
         slot.task = None
         took, printed = time.monotonic() - slot.started, last_lines(slot.printed)
         outcome = dataclasses.replace(outcome, took=took, printed=printed)
-        task.ended(outcome, slot.folder / "map.npz")
-        shutil.rmtree(slot.folder, ignore_errors=True)
+        task.ended(outcome, folder / "map.npz")
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def last_lines(printed: bytes | bytearray, lines: int = 20, characters: int = 4000) -> str:

@@ -289,6 +289,7 @@ class _Book:
             preprocessing=outcome.preprocessing,
             seconds=outcome.seconds,
             cpu_seconds=outcome.cpu_seconds,
+            load=outcome.load,
             peak_memory_mb=outcome.peak_memory_mb,
             uv_file=f"uv/{cell.row.id}.npz" if is_ok else "",
             uv_sha256=outcome.uv_sha256 if is_ok else "",

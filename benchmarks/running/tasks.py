@@ -127,6 +127,7 @@ class Outcome(Message):
         preprocessing: what was done to the surface before the method saw it; "" for nothing.
         seconds: wall time of the method alone; None if it did not come to its end.
         cpu_seconds: processor time of the same.
+        load: how busy the machine was, as in a row; None if not known.
         peak_memory_mb: peak resident memory of the job's processes, in units of 10^6 bytes.
         uv_sha256: hash of the map; "" where there is none.
         report: what the method wrote beside its result.
@@ -137,7 +138,7 @@ class Outcome(Message):
         number: of the job; the supervisor sets it.
 
     Raises:
-        ValueError: a time or an amount of memory is negative or not finite.
+        ValueError: a time, a load or an amount of memory is negative or not finite.
     """
 
     status: Status
@@ -145,6 +146,7 @@ class Outcome(Message):
     preprocessing: str = ""
     seconds: float | None = None
     cpu_seconds: float | None = None
+    load: float | None = None
     peak_memory_mb: float | None = None
     uv_sha256: str = ""
     report: Mapping[str, object] = field(default_factory=dict)
@@ -155,7 +157,7 @@ class Outcome(Message):
     number: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("seconds", "cpu_seconds", "peak_memory_mb", "took"):
+        for name in ("seconds", "cpu_seconds", "load", "peak_memory_mb", "took"):
             amount = getattr(self, name)
             if amount is not None and not 0 <= amount < math.inf:
                 raise ValueError(f"Outcome.{name} cannot be {amount}")

@@ -53,6 +53,8 @@ class ResultRow:
         preprocessing: what was done to the surface before the method saw it; "" for nothing.
         seconds: wall time of `parameterize` alone.
         cpu_seconds: processor time of the same, over all threads and ended child processes.
+        load: how busy the machine was: processes that ran or waited for a processor, over the
+            number of processors (`benchmarks.running.environment.load`); None if not known.
         peak_memory_mb: peak resident memory of the cell's processes, in units of 10^6 bytes.
         uv_file: `uv/<id>.npz`; "" if there is no map.
         uv_sha256: `arrays_hash` of the map. The trace does not count, so equal maps have equal
@@ -76,6 +78,7 @@ class ResultRow:
     preprocessing: str = ""
     seconds: float | None = None
     cpu_seconds: float | None = None
+    load: float | None = None
     peak_memory_mb: float | None = None
     uv_file: str = ""
     uv_sha256: str = ""

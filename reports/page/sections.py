@@ -23,6 +23,7 @@ from reports.pictures.figures import Drawn
 from reports.pictures.names import VIEWED, map_file, model_file, slug
 from reports.tables import leaderboard
 from reports.tables.leaderboard import MEASURES, SHOWN, Glance, Winner, definition, page_of, winner
+from reports.tables.notes import load_notes
 from reports.tables.published import published_values
 from reports.tables.table import Table, metric_column
 
@@ -135,6 +136,11 @@ class Section:
     def counts(self) -> dict[str, int]:
         """Number of cells by status."""
         return dict(Counter(row.status.replace("_", " ") for row in self.contents.rows))
+
+    @property
+    def load_notes(self) -> list[str]:
+        """Which times are unsure, as the machine was busy."""
+        return load_notes(self.contents)
 
     @property
     def unfinished(self) -> list[ResultRow]:

@@ -74,7 +74,7 @@ class Parent:
                 pass
         return Parameterization(surface.vertices[:, :2], surface.faces)
 """
-CURIOUS = Suite("trial", "A trial", ("cone",), ("curious",), (0, 2**32 + 1, 3))
+CURIOUS = Suite("trial", "A trial", ("cone",), ("curious",), (0, 2**32 - 1, 3))
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +92,7 @@ def curious(tmp_path_factory):
 
 
 def test_a_cell_has_its_own_empty_folder_and_set_variables(curious):
-    for seed in (0, 2**32 + 1):
+    for seed in (0, 2**32 - 1):
         report = curious[0][seed].report
         assert report["hashes"] == "0"
         assert report["threads"] == "3"
@@ -103,15 +103,15 @@ def test_a_cell_has_its_own_empty_folder_and_set_variables(curious):
 
 
 def test_generators_that_a_method_forgot_to_seed_are_seeded(curious):
-    for seed in (0, 2**32 + 1):
+    for seed in (0, 2**32 - 1):
         report = curious[0][seed].report
         assert report["random"] == random.Random(seed).random()  # noqa: S311  not for secrets
-        assert report["numpy"] == np.random.RandomState(seed % 2**32).random_sample()
+        assert report["numpy"] == np.random.RandomState(seed).random_sample()
 
 
 def test_what_is_printed_is_kept_of_the_cell_alone_and_bounded(curious):
     rows, _ = curious
-    assert rows[0].output == rows[2**32 + 1].output == ""
+    assert rows[0].output == rows[2**32 - 1].output == ""
     assert 500 < len(rows[3].output) <= 600
     assert rows[3].output.endswith("ValueError: no")
 
@@ -150,7 +150,7 @@ class FakeSlot:
         os.set_blocking(self.replies, False)
         os.set_blocking(self.output, False)
         self.reply, self.printed = bytearray(), bytearray()
-        self.ready, self.task, self.folder, self.started = False, None, Path(), 0.0
+        self.ready, self.task, self.folder, self.started = False, None, None, 0.0
         self.begun: list[Task] = []
         self.time_limit, self.number = 1e9, 0
         self.process = SimpleNamespace(pid=0)

@@ -280,6 +280,7 @@ def test_every_cell_has_its_resources_and_an_ok_one_its_map(faulty):
     assert row.params == {"step": 1}
     assert 0 <= row.seconds < 5
     assert 0 <= row.cpu_seconds < 5
+    assert 0 <= row.load < 1000
     assert 20 < row.peak_memory_mb < 200
     surface, result = store.surface(row), store.result(row)
     assert (result.uv == surface.vertices[:, :2]).all()
