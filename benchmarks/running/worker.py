@@ -8,8 +8,8 @@ the lines that go both ways.
 On Linux the child is a fork, which costs milliseconds. The supervisor itself only imports and never
 computes: it has no thread that a fork could lose (except OpenBLAS's own, which stop and restart
 around a fork). It imports nothing on behalf of a cell, and no plugin: the tenth cell finds what the
-first one found. Elsewhere, where forking after such imports is unsafe, the child is a fresh
-interpreter.
+first one found. All that it learns from its jobs is what the source files of methods import.
+Elsewhere, where forking after such imports is unsafe, the child is a fresh interpreter.
 
 A method can harm its own cell only. The child has its own session, its own empty working folder,
 and a result pipe that ends with it. At a limit all its descendants are killed, including those that
@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
 import gc
 import importlib
 import os
@@ -60,6 +61,7 @@ from benchmarks.running.tasks import (
     from_json,
     to_json,
 )
+from parapoint import sources
 
 POLL = 0.05
 """Seconds between two looks at the memory of the cell's process."""
@@ -89,10 +91,27 @@ def main() -> None:
     os.write(reply, to_json(Ready()))
     while line := jobs.readline():
         job = from_json(line, RunJob, MeasureJob)
+        if isinstance(job, RunJob):
+            _parse(job.spec)
         if isinstance(job, MeasureJob):
             importlib.import_module("benchmarks.metrics.evaluation")  # once, before the forks
         outcome = _supervised(job, wake, [reply, wake, waker, jobs.fileno()])
         os.write(reply, to_json(dataclasses.replace(outcome, number=job.number)))
+
+
+@functools.cache
+def _parse(spec: str) -> None:
+    """Parse the sources of a method, once for all its cells.
+
+    Each cell hashes the sources of its method (`parapoint.sources`), and needs to parse only those
+    that have changed since.
+    """
+    modules = ["parapoint.surfaces.preparation"]
+    location = registry.METHODS.get(spec.partition("(")[0].strip())
+    if location is not None:
+        modules.append(location.partition(":")[0])
+    with contextlib.suppress(Exception):  # a cell says what is wrong with its sources
+        sources.sources(*modules)
 
 
 def _supervised(job: Job, wake: int, private: list[int]) -> Outcome:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from benchmarks.cases.suites import Suite
-from benchmarks.running import local, runner, scratch
+from benchmarks.running import executors, local, runner, scratch
 from benchmarks.running.local import Local
 from benchmarks.running.tasks import MeasureJob, Outcome, Ready, Task, to_json
 from benchmarks.store.results import Store
@@ -79,7 +79,7 @@ CURIOUS = Suite("trial", "A trial", ("cone",), ("curious",), (0, 2**32 - 1, 3))
 
 @pytest.fixture(scope="module")
 def curious(tmp_path_factory):
-    """Rows, by seed, of a method that looks around, and the summary of its run."""
+    """Rows, by seed, of a method that looks around."""
     folder = tmp_path_factory.mktemp("curious")
     (folder / "plugin.py").write_text(PLUGIN)
     with pytest.MonkeyPatch.context() as patch:
@@ -87,13 +87,13 @@ def curious(tmp_path_factory):
         patch.setattr(runner, "_measure", lambda *_: None)
         patch.setattr(local, "OUTPUT_KEPT", 600)
         plugins = [f"{os.path.relpath(folder)}/plugin.py:Curious"]
-        summary = runner.run(CURIOUS, folder / "out", plugins=plugins, jobs=1)
-    return {row.seed: row for row in Store(folder / "out").rows()}, summary
+        runner.run(CURIOUS, folder / "out", plugins=plugins, jobs=1)
+    return {row.seed: row for row in Store(folder / "out").rows()}
 
 
 def test_a_cell_has_its_own_empty_folder_and_set_variables(curious):
     for seed in (0, 2**32 - 1):
-        report = curious[0][seed].report
+        report = curious[seed].report
         assert report["hashes"] == "0"
         assert report["threads"] == "3"
         assert report["is_temporary_folder"] is True
@@ -104,13 +104,13 @@ def test_a_cell_has_its_own_empty_folder_and_set_variables(curious):
 
 def test_generators_that_a_method_forgot_to_seed_are_seeded(curious):
     for seed in (0, 2**32 - 1):
-        report = curious[0][seed].report
+        report = curious[seed].report
         assert report["random"] == random.Random(seed).random()  # noqa: S311  not for secrets
         assert report["numpy"] == np.random.RandomState(seed).random_sample()
 
 
 def test_what_is_printed_is_kept_of_the_cell_alone_and_bounded(curious):
-    rows, _ = curious
+    rows = curious
     assert rows[0].output == rows[2**32 - 1].output == ""
     assert 500 < len(rows[3].output) <= 600
     assert rows[3].output.endswith("ValueError: no")
@@ -124,11 +124,20 @@ def test_the_output_of_the_cell_before_does_not_count(tmp_path, monkeypatch):
     assert row.output.startswith("seed 3\n")
 
 
-def test_the_time_of_methods_is_theirs_or_that_of_the_whole_cell_where_they_fail(curious):
-    rows, summary = curious
-    own = sum(row.seconds for row in rows.values() if row.status == "ok")
-    assert rows[3].seconds is None
-    assert own < summary.method_seconds < summary.seconds
+def test_the_time_of_methods_is_theirs_or_that_of_the_whole_cell_where_they_fail(
+    tmp_path, monkeypatch
+):
+    outcomes = [Outcome("failed", seconds=1.0, took=9.0), Outcome("failed", took=4.0)]
+
+    class Told(Local):
+        def run(self, tasks, _):
+            for task, outcome in zip(tasks, outcomes, strict=bool(tasks)):
+                task.ended(outcome, Path())
+
+    monkeypatch.setattr(executors, "Local", Told)
+    suite = Suite("trial", "A trial", ("cone",), ("tutte",), (0, 1))
+    summary = runner.run(suite, tmp_path, jobs=2)
+    assert summary.method_seconds == (1 + 4) / 2  # two at a time
 
 
 def test_a_process_that_a_method_forks_counts_and_writes_no_map(tmp_path, monkeypatch):
