@@ -19,6 +19,7 @@ from benchmarks.metrics.state import MapState
 from benchmarks.metrics.table import METRICS
 from parapoint.errors import InputError
 from parapoint.files.reading import faults_of, has_faces, read_parameterized, read_point_map
+from parapoint.files.targets import checked_picture
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 
@@ -46,6 +47,8 @@ def score(file: Path, *, reference: Path | None, as_json: bool, heatmap: Path | 
     Polygons are triangulated first; faces are the triangles, numbered from 0 in the file's order.
     JSON has no infinity: an infinite value is the string "inf".
     """
+    given = [file] if reference is None else [file, reference]
+    picture = None if heatmap is None else checked_picture(heatmap, inputs=given)
     if not has_faces(file):
         if reference is not None or heatmap is not None:
             raise InputError(f"{file}: --reference and --heatmap need a mesh, not a point cloud")
@@ -58,10 +61,10 @@ def score(file: Path, *, reference: Path | None, as_json: bool, heatmap: Path | 
         state = map_state(file, reference)
         values = evaluation.values(state)
         title = f"{file}: {summary(state)}"
-        if heatmap is not None:
+        if picture is not None:
             from benchmarks.commands.heatmap import write_heatmap
 
-            write_heatmap(state, heatmap, title=file.name)
+            write_heatmap(state, picture, title=file.name)
     found = grade(values, of_cloud=state is None)
     if as_json:
         print(json.dumps({"grade": found, **json_values(values)}, allow_nan=False))

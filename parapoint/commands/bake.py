@@ -11,7 +11,7 @@ from parapoint.commands.output import TEXTURE
 from parapoint.errors import InputError
 from parapoint.files.png import png
 from parapoint.files.reading import faults_of, read_parameterized, read_surface
-from parapoint.files.targets import checked_target, complete_file, sealed_png
+from parapoint.files.targets import checked_picture, complete_file, sealed_png
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.surface import Mesh, PointCloud
 from parapoint.textures.baking import (
@@ -52,12 +52,10 @@ def bake(
     of points. Of a folder the texture fits the UVs that `map` writes. A normal map is in tangent
     space, as glTF has it; a position map is a geometry image of 16 bits.
     """
-    if Path(out).suffix.lower() != ".png":
-        raise InputError(f"{out}: a texture is written as .png")
     if kind not in MAPS:
         raise InputError(f"--map must be one of {', '.join(MAPS)}, not {kind!r}")
     check_size(texture, margin)
-    path = checked_target(out, inputs=[model, cloud], force=force)
+    path = checked_picture(out, inputs=[model, cloud], force=force)
     points = _points(cloud, kind)
     charted = _charted(model)
     with faults_of(Path(cloud)):
