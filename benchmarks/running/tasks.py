@@ -36,6 +36,7 @@ class Job(Message):
         time_limit: wall time that the job may take, in seconds.
         memory_limit: resident memory that all its processes together may hold, in bytes.
         folder: where the job may write; the executor sets it.
+        number: tells the job from others of its supervisor; the executor sets it.
     """
 
     surface: Path
@@ -43,6 +44,7 @@ class Job(Message):
     time_limit: float
     memory_limit: float
     folder: Path = Path()
+    number: int = 0
 
     @property
     def inputs(self) -> dict[str, Path]:
@@ -122,7 +124,6 @@ class Outcome(Message):
     Attributes:
         status: as in a row.
         reason: why, unless ok: one line.
-        fatal: whether this machine failed rather than the method, so that the run cannot go on.
         preprocessing: what was done to the surface before the method saw it; "" for nothing.
         seconds: wall time of the method alone; None if it did not come to its end.
         cpu_seconds: processor time of the same.
@@ -134,6 +135,7 @@ class Outcome(Message):
         printed: the last lines that the method printed.
         host: name and processor of the cluster's worker; "" on the run's own machine.
         took: wall time of the whole job, in seconds.
+        number: of the job; the supervisor sets it.
 
     Raises:
         ValueError: a time, a load or an amount of memory is negative or not finite.
@@ -141,7 +143,6 @@ class Outcome(Message):
 
     status: Status
     reason: str = ""
-    fatal: bool = False
     preprocessing: str = ""
     seconds: float | None = None
     cpu_seconds: float | None = None
@@ -153,6 +154,7 @@ class Outcome(Message):
     printed: str = ""
     host: str = ""
     took: float = 0.0
+    number: int = 0
 
     def __post_init__(self) -> None:
         for name in ("seconds", "cpu_seconds", "load", "peak_memory_mb", "took"):

@@ -21,6 +21,13 @@ SOURCE_CHANGED = "the source of the method changed during the run; run again"
 """Reason of a row that the next run repeats, whatever hash it has."""
 MISSING = "not installed: "
 """How the reason begins where a package or program was missing; the next run tries again."""
+MACHINE = "through no fault of the method: "
+"""How the reason begins where this machine failed, by a full disk or a damaged file; the next run
+tries again."""
+KILLED = ("SIGHUP", "SIGINT", "SIGQUIT", "SIGKILL", "SIGTERM")
+"""Signals that come from outside, as a rule: a cell that one of them has ended is tried again."""
+WATCHER_KILLED = "the process that watched over it was killed"
+"""Reason of a row whose supervisor ended before the cell; the next run tries again."""
 IDENTITY = ("suite", "case", "method", "params", "seed", "source_hash", "surface_hash")
 """The fields of a row that its id is made of."""
 _log = logging.getLogger("parapoint")

@@ -84,6 +84,7 @@ class Card:
         label: the method.
         row: its cell.
         detail: its parameters that are told.
+        grade: of its map; "" where there is none, or it is not known.
         map: address of what the viewer reads, from the page; "" where there is none.
         pictures: addresses by what they show; of a mesh two, which the viewer takes the place of.
         numbers: the metrics of SHOWN.
@@ -93,6 +94,7 @@ class Card:
     label: Label
     row: ResultRow
     detail: str
+    grade: str
     map: str
     pictures: Mapping[str, str]
     numbers: Sequence[Number]
@@ -261,6 +263,7 @@ class Section:
                     label,
                     row,
                     ", ".join(part for part in (label.detail, seed) if part),
+                    str(self._values[row.id]["grade"] or ""),
                     f"../../{viewed}" if viewed else "",
                     self._pictures(row),
                     self._numbers(case, label, row),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from reports.contents import Contents
+from reports.ranking import COLLAPSED_FLAG
 
 
 def environment_note(contents: Contents) -> str:
@@ -53,7 +54,7 @@ def grade_notes(contents: Contents) -> list[str]:
     notes = []
     for grade, meaning in (
         ("broken", "broken, so not ranked"),
-        ("collapsed", "collapsed (a part of the surface is shrunk to nothing), ranked by angles"),
+        ("collapsed", f"collapsed, so ranked by angles alone ({COLLAPSED_FLAG})"),
     ):
         found = [
             f"{label} on {case}"

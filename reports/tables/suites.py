@@ -207,6 +207,7 @@ def supplement(contents: Contents) -> Table | None:
         set_apart=contents.atlases,
         notes=(
             f"Grades: {BOUNDS}.",
+            *grade_notes(contents),
             *method_notes(contents),
             *_published_notes(authors),
             *failure_notes(contents),

@@ -110,7 +110,7 @@ def test_help_is_light():
         ["run", "--seeds", "-1"],
         ["run", "--jobs", "0"],
         ["run", "--seeds", str(10**23)],
-        ["run", "--seeds", str(2**32)],
+        ["run", "--seeds", str(2**63)],
         ["run", "--jobs", str(10**20)],
         ["run", "--timeout", "0"],
         ["run", "--timeout", "nan"],

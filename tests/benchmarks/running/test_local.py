@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import random
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ PLUGIN = """
 import os, random, time
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 from typing import ClassVar
 
 import numpy as np
@@ -159,7 +161,8 @@ class FakeSlot:
         self.reply, self.printed = bytearray(), bytearray()
         self.ready, self.task, self.folder, self.started = False, None, None, 0.0
         self.begun: list[Task] = []
-        self.time_limit = 1e9
+        self.time_limit, self.number = 1e9, 0
+        self.process = SimpleNamespace(pid=0)
 
     hear, drain = local._Slot.hear, local._Slot.drain
 
@@ -196,7 +199,7 @@ def test_a_supervisor_does_tasks_of_its_own_modules_only(hands):
         if not slot.ready:
             slot.says(to_json(Ready()))
             hands._listen()
-        slot.says(to_json(Outcome("ok")))
+        slot.says(to_json(Outcome("ok", number=hands.sent)))
         hands._listen()
     assert len(hands.slots) == 2
     assert [outcome.status for outcome in outcomes] == ["ok"] * 3
@@ -231,14 +234,54 @@ def test_a_supervisor_that_answers_nonsense_costs_its_task_and_is_replaced(hands
     assert len(hands.slots) == 1
 
 
-def test_a_failure_of_the_machine_ends_the_run_in_one_line(hands):
+def test_the_answer_to_another_task_is_none(hands):
     outcomes: list[Outcome] = []
     hands._assign(task(outcomes))
     (slot,) = hands.slots
-    slot.says(to_json(Ready()) + to_json(Outcome("failed", "map.npz: no space left", fatal=True)))
-    with pytest.raises(InputError, match=r"^map\.npz: no space left; earlier results are intact"):
-        hands._listen()
+    slot.says(
+        to_json(Ready()) + to_json(Outcome("ok", number=0)) + to_json(Outcome("ok", number=2))
+    )
+    hands._listen()
     assert outcomes == []
+    slot.says(to_json(Outcome("failed", number=1)) + to_json(Outcome("ok", number=1)))
+    hands._listen()
+    assert [outcome.status for outcome in outcomes] == ["failed"]
+
+
+def test_a_line_without_an_end_costs_the_task_and_no_memory(hands, monkeypatch):
+    outcomes: list[Outcome] = []
+    monkeypatch.setattr(local, "LONGEST_LINE", 1000)
+    hands._assign(task(outcomes))
+    (slot,) = hands.slots
+    slot.says(to_json(Ready()))
+    hands._listen()
+    slot.says(b"x" * 1001)
+    hands._listen()
+    assert "answered nonsense: a line is too long" in outcomes[0].reason
+
+
+def test_a_supervisor_that_ends_between_two_tasks_is_replaced(hands):
+    outcomes: list[Outcome] = []
+    hands._assign(task(outcomes))
+    (slot,) = hands.slots
+    slot.says(to_json(Ready()))
+    hands._listen()
+    slot.says(to_json(Outcome("ok", number=1)))
+    hands._listen()
+    hands._lost(slot, "killed")
+    assert not hands.slots
+    assert [outcome.status for outcome in outcomes] == ["ok"]
+
+
+def test_a_supervisor_that_never_starts_ends_the_run_in_one_line(hands):
+    hands._assign(task([]))
+    for _ in range(local.MOST_STARTS - 1):
+        (slot,) = hands.slots
+        hands._lost(slot, "")
+    (slot,) = hands.slots
+    slot.printed += b"no such module\n"
+    with pytest.raises(InputError, match="no process can be started for a cell: no such module"):
+        hands._lost(slot, "")
 
 
 def test_the_memory_of_the_machine_is_shared_by_the_jobs(monkeypatch):

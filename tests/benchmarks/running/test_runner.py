@@ -183,7 +183,7 @@ def row_of(faulty: tuple[Summary, Store], method: str) -> ResultRow:
         ("quitter", "failed", "ended the process (exit status 0) with no result"),
         ("exiter", "failed", "SystemExit: enough"),
         ("suicide", "failed", "killed by SIGKILL (killed)"),
-        ("patricide", "failed", "killed the process that watched over it"),
+        ("patricide", "failed", "the process that watched over it was killed"),
         ("refused", "out_of_memory", "MemoryError"),
         ("sleeper", "timeout", "not done within the limit of 3 s"),
         ("printer", "failed", "ValueError: two lines"),

@@ -3,6 +3,7 @@ import json
 import pytest
 
 from reports.contents import (
+    ANGLE,
     AREA,
     POINT_ANGLE,
     POINT_AREA,
@@ -106,6 +107,13 @@ def test_the_page_shows_what_was_ranked_here(tmp_path):
     first = shown([one["entries"] for one in only["models"][0]["maps"]])
     assert [first[name][2] for name in ("Tutte", "LSCM", "ARAP")] == ["", "best", "second"]
     assert winner(made, "a", AREA).names == ("LSCM",)
+    angle = [metric["name"] for metric in given["metrics"]].index(ANGLE)
+    again = contents(tmp_path)[0]
+    again.means.loc[again.means["label"] == "LSCM", "grade"] = "collapsed"
+    maps = data([again])["suites"][0]["models"][0]["maps"]
+    lscm = maps[order.index("LSCM")]["entries"]
+    assert lscm[angle][0].endswith(" †")
+    assert (lscm[at][0].endswith(" †"), lscm[at][2]) == (False, "")
     rows = comparison(made, [AREA])
     marks = {cells[1].text: [cell.mark for cell in cells[2:6]] for cells in rows.cells[0]}
     assert marks["Tutte"] == [""] * 4
