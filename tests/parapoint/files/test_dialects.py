@@ -316,3 +316,11 @@ def test_memory_lifts_the_bound_on_what_files_decode_to(
     assert "or allow --memory 1 GB" in said[0]
     assert "1 distinct points; a fit needs at least 100" in said[1]
     assert "--memory must be" in said[2]
+
+
+def test_stl_with_notes_behind_its_triangles(tmp_path: Path) -> None:
+    """As some tools append; a text that says solid is a text."""
+    triangle = np.array([[0, 0, 1], [0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4").tobytes() + bytes(2)
+    data = bytes(80) + struct.pack("<I", 1) + triangle
+    for notes in (b"", b"colour=red", bytes(60)):
+        assert len(of_file(tmp_path, "a.stl", data + notes)) == 3
