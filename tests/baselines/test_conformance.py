@@ -18,7 +18,7 @@ COPY = (  # an external program: every vertex to its x and y
     " {input} {output}"
 )
 ARGUMENTS = {
-    "unwrap": {"points": 120, "iterations": 2},
+    "unwrap": {"points": 120},
     "meshed": {"reconstruction": "ball_pivoting"},  # the faster one
     "external": {"command": COPY},
     "fam": {"points": 120, "subset": 100, "iterations": 2},

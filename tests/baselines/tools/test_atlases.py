@@ -12,9 +12,10 @@ from baselines.tools.meshlab import matched_faces
 from baselines.tools.optional import Missing, optional
 from parapoint.errors import InputError
 from parapoint.method import MissingError
+from parapoint.planar.domains import FlatteningError
+from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.surface import Mesh
 from parapoint.testing import irregular_disk, sphere
-from parapoint.unwrapping.domains import FlatteningError, signed_areas
 
 
 def mapped(spec, mesh):

@@ -11,6 +11,7 @@ from scipy.sparse import csgraph
 
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
+from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, Surface, flat_faces
 
 
@@ -105,11 +106,6 @@ def far_pair(points: FloatArray) -> tuple[int, int]:
     """Two far points of (B, 3): the farthest from their mean, and the farthest from that."""
     one = int(((points - points.mean(axis=0)) ** 2).sum(axis=1).argmax())
     return one, int(((points - points[one]) ** 2).sum(axis=1).argmax())
-
-
-def signed_areas(uv: FloatArray, faces: IntArray) -> FloatArray:
-    """(F,) area of each triangle in the plane, negative where it is turned over."""
-    return np.asarray(igl.doublearea(uv, faces) / 2, dtype=np.float64)
 
 
 def finite(uv: FloatArray) -> FloatArray:
