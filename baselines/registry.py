@@ -7,6 +7,7 @@ torch, alone.
 from __future__ import annotations
 
 import ast
+import contextlib
 import functools
 import hashlib
 import importlib
@@ -14,6 +15,7 @@ import importlib.util
 import re
 import sys
 import types
+from collections.abc import Iterator
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from difflib import get_close_matches
 from importlib import metadata
@@ -69,7 +71,6 @@ class Description:
     """A method in words.
 
     Attributes:
-        name: its name in the registry.
         summary: first line of its docstring.
         requires: what a surface must be, words of `parapoint.method.REQUIREMENTS`, sorted.
         parameters: its fields and their defaults, as source text; "" for none.
@@ -77,7 +78,6 @@ class Description:
             parameters".
     """
 
-    name: str
     summary: str
     requires: tuple[str, ...]
     parameters: dict[str, str]
@@ -106,7 +106,8 @@ def method(spec: str) -> tuple[str, Method]:
         if key not in known:
             raise InputError(f"{name} has no parameter {key!r}; {_near(key, list(known))}")
         arguments[key] = _checked(value, known[key], f"{name}: {key}")
-    return name, kind(**arguments)
+    with _foreign_code(name):
+        return name, kind(**arguments)
 
 
 def register_plugin(location: str) -> str:
@@ -133,16 +134,32 @@ def register_plugin(location: str) -> str:
         module = importlib.util.module_from_spec(spec)
         sys.modules[module_name] = module  # dataclass and pickle look their module up here
         try:
-            spec.loader.exec_module(module)
-        except Exception as error:  # whatever a user's file raises is bad input
+            with _foreign_code(path):
+                spec.loader.exec_module(module)
+        except BaseException:
             del sys.modules[module_name]
-            raise InputError(f"{path} does not run: {type(error).__name__}: {error}") from error
+            raise
     name = class_name.lower()
     kind = _method_class(sys.modules[module_name], class_name, path)
     if name in names() and _plugins.get(name) is not kind:
         raise InputError(f"there is a method {name!r} already; rename the class in {path}")
     _plugins[name] = kind
     return name
+
+
+@contextlib.contextmanager
+def _foreign_code(name: str) -> Iterator[None]:
+    """A block that runs code of a plugin, whose errors, and attempts to exit, are bad input.
+
+    Raises:
+        InputError: the code raised something other than a KeyboardInterrupt.
+    """
+    try:
+        yield
+    except (InputError, KeyboardInterrupt):
+        raise
+    except BaseException as error:
+        raise InputError(f"{name} does not run: {type(error).__name__}: {error}") from error
 
 
 def describe(name: str) -> Description:
@@ -161,7 +178,7 @@ def describe(name: str) -> Description:
     summary = (kind.__doc__ or "").strip().split("\n", maxsplit=1)[0]
     promise = {True: "yes", False: "no"}.get(getattr(kind, "deterministic", True))
     return Description(
-        name, summary, tuple(sorted(kind.requires)), parameters, promise or "by its parameters"
+        summary, tuple(sorted(kind.requires)), parameters, promise or "by its parameters"
     )
 
 
@@ -296,12 +313,8 @@ def _class(name: str) -> type[Method]:
         if name in RENAMED:
             raise InputError(f"{name} is called {RENAMED[name]} now")
         raise InputError(f"there is no method {name!r}; {_near(name, names())}")
-    try:
+    with _foreign_code(f"the plugin {name} ({entry.value})"):
         module = importlib.import_module(entry.module)
-    except ImportError as error:
-        raise InputError(
-            f"the plugin {name} ({entry.value}) cannot be imported: {error}"
-        ) from error
     return _method_class(module, entry.attr, entry.value)
 
 

@@ -16,9 +16,10 @@ if TYPE_CHECKING:
     from benchmarks.running.runner import Summary
 
 SUITE = "paper"
-"""What `run` runs if nothing is named."""
+"""The suite that `run` runs if none is named."""
 ELSEWHERE = {"ignore_unknown_options": True, "help_option_names": []}
-"""Settings of a command whose options are read by a module that is imported only to run it."""
+"""Settings of a command whose own module reads the options. That module is slow to import, so only
+running the command imports it."""
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -28,7 +29,7 @@ def main() -> None:
 
 
 def split(text: str) -> list[str]:
-    """The parts of a list with commas between them; those inside brackets and quotes belong to one.
+    """The parts of a list that commas separate, except for commas inside brackets or quotes.
 
     Raises:
         InputError: a bracket or a quote is not closed, or a part is empty.
@@ -53,12 +54,12 @@ def split(text: str) -> list[str]:
 
 
 def _list(_: click.Context, __: click.Parameter, text: str | None) -> list[str] | None:
-    """An option that is a list."""
+    """The value of an option that is a list of texts."""
     return None if text is None else split(text)
 
 
 def _seeds(_: click.Context, __: click.Parameter, text: str | None) -> list[int] | None:
-    """An option that is a list of seeds."""
+    """The value of an option that is a list of seeds."""
     if text is None:
         return None
     if not all(part.isascii() and part.isdigit() for part in split(text)):
@@ -81,14 +82,14 @@ def _seeds(_: click.Context, __: click.Parameter, text: str | None) -> list[int]
 )
 @click.option(
     "--timeout",
-    type=click.FloatRange(0, min_open=True),
+    type=float,
     default=1800,
     show_default=True,
     help="Seconds a cell may take.",
 )
 @click.option(
     "--memory",
-    type=click.FloatRange(0, min_open=True),
+    type=float,
     help="GB a cell may hold.  [default: four fifths of the machine's, / jobs]",
 )
 @click.option("--out", type=click.Path(path_type=Path), default="results", show_default=True)
@@ -134,7 +135,7 @@ def run(
 
 
 def _shown_run(suite: Suite, out: Path, **options: Any) -> Summary:
-    """Run a suite in view of the user."""
+    """Run a suite, and show the user how it goes."""
     from benchmarks.commands.display import Display, print_summary
     from benchmarks.running import runner
 
@@ -159,15 +160,16 @@ def list_(what: str) -> None:
 @click.pass_context
 def check(ctx: click.Context, folder: Path) -> None:
     """Verify every row of a results folder against its files, and a sample of its metrics."""
+    from benchmarks.store import verifying
     from benchmarks.store.results import Store
 
     if not (folder / "runs.jsonl").is_file():
         raise InputError(f"{folder} is no results folder: it has no runs.jsonl")
     store = Store(folder)
     faults = 0
-    for fault in store.faults():
+    for fault in verifying.faults(store):
         faults += 1
-        print(fault)
+        print(console.printable(fault, console.LONGEST_MESSAGE))
     rows = store.rows()
     maps = sum(row.status == "ok" for row in rows)
     print(f"{len(rows)} cells, {maps} maps: {faults or 'no'} fault{'s' * (faults != 1)}")

@@ -2,12 +2,37 @@
 
 from __future__ import annotations
 
+import hashlib
 import sys
 from typing import Never
 
 import click
 
 from parapoint.errors import InputError
+
+LONGEST_MESSAGE = 2000
+"""Characters of a message that are printed."""
+LONGEST_NAME = 200
+"""Characters of a name that are shown."""
+
+
+def printable(text: str, longest: int = LONGEST_NAME) -> str:
+    """Text from elsewhere as one line that nothing reads as more than text.
+
+    A terminal obeys control characters, a page may be turned by those of writing from right to
+    left, and halves of surrogate pairs cannot be encoded: each is written as its Python escape.
+
+    Args:
+        text: what is to be shown.
+        longest: characters after which it is cut; a hash then tells it from others.
+    """
+    shown = "".join(
+        letter if letter.isprintable() else letter.encode("unicode_escape").decode()
+        for letter in text
+    )
+    if len(shown) <= longest:
+        return shown
+    return f"{shown[:longest]}… ({hashlib.sha256(shown.encode()).hexdigest()[:6]})"
 
 
 def run(command: click.Command, arguments: list[str] | None = None) -> Never:
@@ -26,5 +51,5 @@ def run(command: click.Command, arguments: list[str] | None = None) -> Never:
 
 def fail(message: str) -> Never:
     """Print `message` as one line to standard error and exit with status 2."""
-    print("error: " + " ".join(message.split()), file=sys.stderr)
+    print("error: " + printable(" ".join(message.split()), LONGEST_MESSAGE), file=sys.stderr)
     sys.exit(2)

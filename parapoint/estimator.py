@@ -16,7 +16,14 @@ import numpy.typing as npt
 from parapoint import fitting, saving
 from parapoint.errors import InputError
 from parapoint.fitting import COMPONENTS, Fitted, Progress, Session, SurfaceMap
-from parapoint.parameters import check_choice, check_number, check_whole
+from parapoint.parameters import (
+    LARGEST_SEED,
+    LONGEST_SECONDS,
+    check_choice,
+    check_number,
+    check_whole,
+)
+from parapoint.surfaces.dimension import checked_dimension
 from parapoint.surfaces.frame import Frame
 from parapoint.surfaces.gridding import gridded
 from parapoint.surfaces.parameterization import (
@@ -79,9 +86,9 @@ class Estimator(ABC):
             InputError: one is not as its docstring says.
         """
         check_choice("components", self.components, COMPONENTS)
-        check_whole("seed", self.seed, 0)
+        check_whole("seed", self.seed, 0, LARGEST_SEED)
         if self.time_budget is not None:
-            check_number("time_budget", self.time_budget, above=True)
+            check_number("time_budget", self.time_budget, most=LONGEST_SECONDS, above=True)
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:  # noqa: ARG002 (scikit-learn's name)
         """The parameters by name."""
@@ -122,7 +129,8 @@ class Estimator(ABC):
 
         Raises:
             InputError: a parameter is not as said, there are fewer than 100 distinct points, or
-                they lie on a line; the checkpoint is of another run or version.
+                they lie along a curve, or farther apart than a number can say; the checkpoint is of
+                another run or version.
             RuntimeError: the strategy failed: `ReconstructionError` of `ComputedMap`,
                 `DivergedError` of `ParaPoint`.
         """
@@ -135,8 +143,9 @@ class Estimator(ABC):
     def _fit(self, points: npt.ArrayLike | Surface, session: Session) -> Self:
         self.check()
         surface, strays = without_strays(surface_of(points))
+        shape = checked_dimension(surface)
         fitted = fitting.fitted(self.fit_part, surface, self.components, session)
-        fitted.report.update(strays)
+        fitted.report.update(strays | shape)
         return self._take(fitted)
 
     def _take(self, fitted: Fitted) -> Self:

@@ -8,12 +8,18 @@ from collections.abc import Collection
 
 from parapoint.errors import InputError
 
+LARGEST_SEED = 2**32 - 1
+"""Largest seed that every generator of random numbers takes."""
+LONGEST_SECONDS = 1e9
+"""Largest time, in seconds, that may be asked for: some thirty years."""
 
-def check_whole(name: str, value: object, least: int) -> None:
-    """Raise InputError unless `value` is a whole number (numpy's count too) of at least `least`."""
+
+def check_whole(name: str, value: object, least: int, most: int | None = None) -> None:
+    """Raise InputError unless `value` is a whole number (numpy's count too) in [least, most]."""
     is_whole = isinstance(value, numbers.Integral) and not isinstance(value, bool)
-    if not is_whole or int(str(value)) < least:
-        raise InputError(f"{name} must be a whole number of at least {least}, not {value!r}")
+    if not is_whole or int(str(value)) < least or (most is not None and int(str(value)) > most):
+        upper = "" if most is None else f" and at most {most}"
+        raise InputError(f"{name} must be a whole number of at least {least}{upper}, not {value!r}")
 
 
 def check_choice(name: str, value: object, choices: Collection[str]) -> None:

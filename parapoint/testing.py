@@ -8,7 +8,7 @@ from dataclasses import asdict, is_dataclass
 from typing import Any, cast
 
 import numpy as np
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, cKDTree
 
 from parapoint.method import REQUIREMENTS, Method, MissingError, UnsupportedError
 from parapoint.surfaces.cutting import cut_along, disk_cut
@@ -17,6 +17,20 @@ from parapoint.surfaces.preparation import prepared
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, PointCloud, Surface
 
 SEED = 7
+SIMILARITIES = ((5e5, 1e-6), (6e6, 1e6))
+"""Shifts, in sizes of the surface, and scales of the similar surfaces that are tried."""
+ALIKE = 1e-3
+"""Most that a measure of the map of a similar surface differs by; more only if seeds do."""
+OTHER_SEEDS = (1, 2, 3)
+SEEDS_APART = 2.0
+"""The range of the measures over a few seeds counts so many times: there are more seeds."""
+"""Seed of the methods and of the surfaces that they are checked on."""
+THINNEST = 1e-9
+"""Ratio of a map's width to its length up to which it counts as collapsed to a line."""
+
+
+class BrokenPromiseError(AssertionError):
+    """A method breaks a promise of the protocol; the message says which, and on which surface."""
 
 
 def check_method(method: Method, surface: Surface | None = None) -> None:
@@ -30,6 +44,8 @@ def check_method(method: Method, surface: Surface | None = None) -> None:
       corners are in the order of the mesh.
     - The same seed gives the same map, bit by bit, unless the method says that it is not
       `deterministic`. The arrays of the surface do not change.
+    - A similar surface, far from the origin and in another unit, has a map alike: what the map
+      does to lengths and areas differs by ALIKE at most, or by what seeds make it differ.
     - A trace counts up in steps and seconds, and its maps are finite and of the result's shape.
 
     Args:
@@ -37,7 +53,7 @@ def check_method(method: Method, surface: Surface | None = None) -> None:
         surface: one surface to check it on, in place of the tiny ones; an unsupported one is fine.
 
     Raises:
-        AssertionError: a promise is broken; the message says which, and on which surface.
+        BrokenPromiseError: a promise is broken; the message says which, and on which surface.
         MissingError: a package or program that the method needs is not there.
         UnsupportedError: nothing could be checked, as the method refuses every surface.
     """
@@ -59,12 +75,14 @@ def check_method(method: Method, surface: Surface | None = None) -> None:
             maps = [_check_run(method, part, where) for part in preparation.parts]
             if not checked and getattr(method, "deterministic", True):
                 _check_repeat(method, preparation.parts[0], maps[0], where)
+            if not checked:
+                _check_similar(method, preparation.parts[0], maps[0], where)
         except MissingError:
             raise
         except UnsupportedError as error:
             refusal = error
             if checked:
-                raise AssertionError(f"{where}: refused, though it meets `requires`") from error
+                raise BrokenPromiseError(f"{where}: refused, though it meets `requires`") from error
             continue
         checked += 1
     if not checked and refusal is not None:
@@ -138,18 +156,19 @@ def defective() -> Mesh:
 
 def _check_declaration(method: Method, name: str) -> None:
     """The class is as the protocol says."""
-    assert is_dataclass(method), f"{name}: is no dataclass"
-    assert not isinstance(method, type), f"{name}: give a method, not its class"
-    assert isinstance(method.requires, frozenset), f"{name}: requires is no frozenset"
+    _promise(is_dataclass(method), f"{name}: is no dataclass")
+    _promise(not isinstance(method, type), f"{name}: give a method, not its class")
+    _promise(isinstance(method.requires, frozenset), f"{name}: requires is no frozenset")
     unknown = sorted(method.requires - REQUIREMENTS.keys())
-    assert not unknown, f"{name}: requires unknown words {unknown}; known: {sorted(REQUIREMENTS)}"
+    known = sorted(REQUIREMENTS)
+    _promise(not unknown, f"{name}: requires unknown words {unknown}; known: {known}")
     parameters = asdict(cast("Any", method))
     _check_json(parameters, f"{name}: its parameters")
     try:
         copy = pickle.loads(pickle.dumps(method))  # noqa: S301 (our own bytes)
     except Exception as error:
-        raise AssertionError(f"{name}: cannot be pickled: {error}") from error
-    assert asdict(copy) == parameters, f"{name}: pickling changes its parameters"
+        raise BrokenPromiseError(f"{name}: cannot be pickled: {error}") from error
+    _promise(asdict(copy) == parameters, f"{name}: pickling changes its parameters")
 
 
 def _check_json(value: object, what: str) -> None:
@@ -157,7 +176,7 @@ def _check_json(value: object, what: str) -> None:
     try:
         json.dumps(value)
     except (TypeError, ValueError) as error:
-        raise AssertionError(f"{what} cannot be written as JSON: {error}") from error
+        raise BrokenPromiseError(f"{what} cannot be written as JSON: {error}") from error
 
 
 def _check_refusal(method: Method, surface: Surface, where: str) -> None:
@@ -166,7 +185,7 @@ def _check_refusal(method: Method, surface: Surface, where: str) -> None:
         method.parameterize(surface, seed=SEED)
     except Exception:  # noqa: BLE001 (any error is a refusal; only silence is not)
         return
-    raise AssertionError(f"{where}: returned a map, though `requires` refuses this surface")
+    raise BrokenPromiseError(f"{where}: returned a map, though `requires` refuses this surface")
 
 
 def _check_run(
@@ -176,20 +195,26 @@ def _check_run(
     before = _arrays(surface)
     result = method.parameterize(surface, seed=SEED)
     for name, array in _arrays(surface).items():
-        assert np.array_equal(array, before[name]), f"{where}: changed the surface's {name}"
+        _promise(np.array_equal(array, before[name]), f"{where}: changed the surface's {name}")
     if isinstance(surface, Mesh):
-        assert isinstance(result, Parameterization), (
-            f"{where}: returned {type(result).__name__}; a mesh needs a Parameterization"
-        )
+        if not isinstance(result, Parameterization):
+            returned = type(result).__name__
+            raise BrokenPromiseError(
+                f"{where}: returned {returned}; a mesh needs a Parameterization"
+            )
         _check_corners(surface, result, where)
     else:
-        assert isinstance(result, PointParameterization), (
-            f"{where}: returned {type(result).__name__}; a cloud needs a PointParameterization"
-        )
+        if not isinstance(result, PointParameterization):
+            returned = type(result).__name__
+            raise BrokenPromiseError(
+                f"{where}: returned {returned}; a cloud needs a PointParameterization"
+            )
         shape = (len(surface.points), 2)
-        assert result.uv.shape == shape, f"{where}: uv has shape {result.uv.shape}, not {shape}"
+        found = result.uv.shape
+        _promise(found == shape, f"{where}: uv has shape {found}, not {shape}")
     spread = np.linalg.svd(result.uv - result.uv.mean(axis=0), compute_uv=False)
-    assert spread[1] > 1e-9 * spread[0], f"{where}: the map collapsed to a line or a point"
+    wide = bool(spread[1] > THINNEST * spread[0])
+    _promise(wide, f"{where}: the map collapsed to a line or a point")
     _check_trace(result, where)
     _check_json(dict(result.report), f"{where}: the report")
     return result
@@ -208,16 +233,16 @@ def _arrays(surface: Surface) -> dict[str, FloatArray | IntArray]:
 def _check_corners(mesh: Mesh, result: Parameterization, where: str) -> None:
     """One row of corners a face, and no row of uv for two places of the surface."""
     shape = mesh.faces.shape
-    assert result.corners.shape == shape, (
-        f"{where}: corners have shape {result.corners.shape}, the faces {shape}"
-    )
+    found = result.corners.shape
+    _promise(found == shape, f"{where}: corners have shape {found}, the faces {shape}")
     place = mesh.vertices[mesh.faces].reshape(-1, 3)
     row = result.corners.reshape(-1)
     last = np.zeros((len(result.uv), 3))
     last[row] = place
-    assert np.array_equal(last[row], place), (
+    _promise(
+        np.array_equal(last[row], place),
         f"{where}: a row of uv serves corners at different places: "
-        "faces or corners are not in the order of the mesh"
+        "faces or corners are not in the order of the mesh",
     )
 
 
@@ -227,11 +252,12 @@ def _check_trace(result: Parameterization | PointParameterization, where: str) -
         ("iterations", [point.iteration for point in result.trace]),
         ("seconds", [point.seconds for point in result.trace]),
     ):
-        assert values == sorted(values), f"{where}: the {name} of the trace go back"
+        _promise(values == sorted(values), f"{where}: the {name} of the trace go back")
     for point in result.trace:
         if point.uv is not None:
             fits = point.uv.shape == result.uv.shape and np.isfinite(point.uv).all()
-            assert fits, f"{where}: the map at iteration {point.iteration} of the trace is not one"
+            which = f"the map at iteration {point.iteration} of the trace"
+            _promise(bool(fits), f"{where}: {which} is not one")
 
 
 def _check_repeat(
@@ -245,4 +271,77 @@ def _check_repeat(
     same = np.array_equal(first.uv, second.uv)
     if isinstance(first, Parameterization) and isinstance(second, Parameterization):
         same = same and np.array_equal(first.corners, second.corners)
-    assert same, f"{where}: another map under the same seed"
+    _promise(same, f"{where}: another map under the same seed")
+
+
+def _promise(kept: bool, otherwise: str) -> None:
+    """Hold a method to one promise; unlike `assert`, this does so under `python -O` as well.
+
+    Raises:
+        BrokenPromiseError: the promise is not kept; the message is `otherwise`.
+    """
+    if not kept:
+        raise BrokenPromiseError(otherwise)
+
+
+def _check_similar(
+    method: Method,
+    surface: Surface,
+    first: Parameterization | PointParameterization,
+    where: str,
+) -> None:
+    """The map of a similar surface is alike, wherever it lies, in any unit."""
+    known = measures(surface, first)
+    for shift, scale in SIMILARITIES:
+        what = f"{where}: moved by {shift:g} times its size and scaled by {scale:g}, it"
+        try:
+            found = method.parameterize(similar(surface, shift, scale), seed=SEED)
+        except MissingError:
+            raise
+        except Exception as error:
+            raise BrokenPromiseError(f"{what} cannot be mapped: {error}") from error
+        apart = float(np.abs(measures(surface, found) - known).max())
+        if apart > ALIKE:
+            others = [method.parameterize(surface, seed=seed) for seed in OTHER_SEEDS]
+            by_seed = np.ptp([known, *(measures(surface, other) for other in others)], axis=0)
+            _promise(
+                apart <= SEEDS_APART * float(by_seed.max()),
+                f"{what} has another map: lengths or areas differ by {apart:.2g}",
+            )
+
+
+def similar(surface: Surface, shift: float, scale: float) -> Surface:
+    """The surface moved by so many times its size along each axis, then scaled."""
+    points = surface.vertices if isinstance(surface, Mesh) else surface.points
+    moved = scale * (points + shift * float(np.ptp(points, axis=0).max()))
+    if isinstance(surface, Mesh):
+        return Mesh(moved, surface.faces, surface.seams)
+    return PointCloud(moved, surface.normals, surface.dropped, surface.attributes)
+
+
+def measures(surface: Surface, result: Parameterization | PointParameterization) -> FloatArray:
+    """(2,) how unevenly a map changes lengths and signed areas, whatever the unit of either side.
+
+    The sums of absolute differences between the shares that edges, and faces, have of the whole on
+    the surface and in the plane: 0 where all shares stay, 2 at most but for flipped faces. The
+    edges of a cloud lead to its six nearest neighbours; it has no faces.
+    """
+    if isinstance(result, PointParameterization):
+        assert isinstance(surface, PointCloud)
+        near = cKDTree(surface.points).query(surface.points, 7)[1][:, 1:]
+        lengths = [
+            np.linalg.norm(of[near] - of[:, None], axis=2) for of in (surface.points, result.uv)
+        ]
+        return np.array([_share_difference(*lengths), 0.0])
+    assert isinstance(surface, Mesh)
+    corners = surface.vertices[surface.faces], result.uv[result.corners]
+    lengths = [np.linalg.norm(of - np.roll(of, 1, axis=1), axis=2) for of in corners]
+    (ax, ay), (bx, by) = ((corners[1][:, k] - corners[1][:, 0]).T for k in (1, 2))
+    turned = ax * by - ay * bx
+    turned *= np.sign(turned.sum()) or 1.0
+    return np.array([_share_difference(*lengths), _share_difference(surface.face_areas, turned)])
+
+
+def _share_difference(one: FloatArray, other: FloatArray) -> float:
+    total = np.abs(other).sum()
+    return float(np.abs(one / one.sum() - other / (total or 1.0)).sum())

@@ -28,9 +28,9 @@ from parapoint import console
 def main(folder: Path, exports: bool, against: tuple[Path, ...]) -> None:
     """Write the report, or the comparisons, and say where they are."""
     if against:
-        from reports import history
+        from reports.history import pages
 
-        for page, said in history.write(folder, against):
+        for page, said in pages.write(folder, against):
             print(f"{page}: {said}")
         return
     from reports.report import write

@@ -16,11 +16,14 @@ import pandas as pd
 
 from benchmarks.cases.suites import SUITES
 from benchmarks.metrics.table import METRICS
-from benchmarks.store.results import ResultRow, Store
+from benchmarks.store import measuring
+from benchmarks.store.results import Store
+from benchmarks.store.rows import ResultRow
+from parapoint.console import LONGEST_MESSAGE, printable
 from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh, PointCloud
-from reports.ranking import grade_of, worst
+from reports.ranking import TIMES, grade_of, worst
 
 ANGLE, AREA = "angle_difference_mean", "area_discrepancy_total"
 FLIPPED, SPANNING = "flipped_fraction", "spanning_fraction"
@@ -28,6 +31,7 @@ WORST_PART = "part_area_ratio_min_without_spanning"
 SHEETS = 12
 """Most models of a report in which each has figures of its own, and all pictures for them."""
 ISOMETRIC = "symmetric_dirichlet"
+OVERLAPPED, BIJECTIVE = "overlapped_fraction", "bijective"
 POINT_ANGLE, POINT_AREA = "local_quasi_conformal_mean", "local_area_log_ratio_mean"
 POINT_COLLISIONS, POINT_TEARS = "uv_collision_fraction", "spanning_point_fraction"
 
@@ -192,7 +196,7 @@ class Contents:
         suite: its name.
         rows: the latest row of each cell.
         labels: the label of each row, by its id.
-        measured: one row a cell: case, label (short), seed, status, id, grade, seconds, metrics.
+        measured: one row a cell: case, label (short), seed, status, id, grade, TIMES, metrics.
         is_large: whether the folder holds more than SHEETS models, all suites together: then few
             have figures of their own, and pictures are small.
     """
@@ -203,6 +207,12 @@ class Contents:
     labels: Mapping[str, Label]
     measured: pd.DataFrame
     is_large: bool
+
+    @cached_property
+    def runs(self) -> list[dict[str, Any]]:
+        """The environment of each run of the folder, its texts printable."""
+        found: list[dict[str, Any]] = readable(self.store.environment()["runs"])
+        return found
 
     @cached_property
     def cases(self) -> list[str]:
@@ -281,7 +291,7 @@ class Contents:
         """One row a (case, label): means over the seeds that ended well, and counts.
 
         Columns: case, label, ok, tried, skipped, status, reason, preprocessing, grade (the worst of
-        the seeds), seconds, metrics. A skipped cell was not tried.
+        the seeds), TIMES, metrics. A skipped cell was not tried.
         """
         records = []
         for case in self.cases:
@@ -303,11 +313,11 @@ class Contents:
                     "preprocessing": rows[0].preprocessing,
                     "grade": worst(values["grade"].tolist()) or "",
                 }
-                for name in ("seconds", *METRICS):
+                for name in (*TIMES, *METRICS):
                     record[name] = values[name].mean() if len(values) else None
                 records.append(record)
         frame = pd.DataFrame.from_records(records)
-        numbers = ["seconds", *METRICS]
+        numbers = [*TIMES, *METRICS]
         return frame.astype(dict.fromkeys(numbers, "float64"))
 
     @cached_property
@@ -327,6 +337,33 @@ def number(record: Mapping[str, object] | None, name: str) -> float | None:
     return float(value)
 
 
+def _readable_row(row: ResultRow) -> ResultRow:
+    """The row with every text in it printable (`parapoint.console.printable`)."""
+    return dataclasses.replace(
+        row,
+        suite=printable(row.suite),
+        case=printable(row.case),
+        method=printable(row.method),
+        params=readable(row.params),
+        reason=printable(row.reason, LONGEST_MESSAGE),
+        output="\n".join(printable(line, LONGEST_MESSAGE) for line in row.output.splitlines()),
+        preprocessing=printable(row.preprocessing),
+        report=readable(row.report),
+        host=printable(row.host),
+    )
+
+
+def readable(value: Any) -> Any:
+    """A value out of JSON with every text in it printable."""
+    if isinstance(value, str):
+        return printable(value)
+    if isinstance(value, list):
+        return [readable(entry) for entry in value]
+    if isinstance(value, Mapping):
+        return {printable(str(key)): readable(entry) for key, entry in value.items()}
+    return value
+
+
 def contents(folder: Path) -> list[Contents]:
     """What `folder` holds, suite by suite.
 
@@ -336,24 +373,26 @@ def contents(folder: Path) -> list[Contents]:
     if not folder.exists():
         raise InputError(f"{folder}: no such folder; `python -m benchmarks run` makes one")
     store = Store(folder)
-    rows = store.rows()
+    rows = [_readable_row(row) for row in store.rows()]
     if not rows:
         raise InputError(
             f"{folder} holds no results: it has no readable line in runs.jsonl; "
             "`python -m benchmarks run` writes them"
         )
-    frame = store.metrics()
+    frame = measuring.metrics(store)
     is_large = len({row.case for row in rows}) > SHEETS
     found = []
     for suite in dict.fromkeys(row.suite for row in rows):
         own = tuple(row for row in rows if row.suite == suite)
         by_key = labels(own)
         by_id = {row.id: by_key[_key(row)] for row in own}
-        seconds = {row.id: row.seconds for row in own}
+        cases = {row.id: row.case for row in own}
+        times = {name: {row.id: getattr(row, name) for row in own} for name in TIMES}
         part = frame[frame["id"].isin(by_id)].drop(columns=["method", "params", "suite"])
         part = part.assign(
+            case=part["id"].map(cases),
             label=part["id"].map(lambda key, by_id=by_id: by_id[key].short),
-            seconds=part["id"].map(seconds).astype("float64"),
+            **{name: part["id"].map(of).astype("float64") for name, of in times.items()},
         )
         # A learned seam that faces span has no edges: 0 would read, and rank, as no seam at all.
         part.loc[part[SPANNING] > 0, ["seam_length", "seam_excess"]] = math.nan

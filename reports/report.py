@@ -6,8 +6,10 @@ from pathlib import Path
 
 from reports.contents import contents
 from reports.page import pages as page
+from reports.page.sections import Section
 from reports.pictures import drawing as pictures
 from reports.pictures import exports, figures
+from reports.pictures.names import slug
 from reports.tables import formats
 from reports.tables import suites as tables
 
@@ -27,12 +29,12 @@ def write(folder: Path, *, jobs: int, textured: bool = False) -> Path:
     sections = []
     for suite in contents(folder):
         made = tables.tables(suite)
-        name = pictures.slug(suite.suite)
+        name = slug(suite.suite)
         formats.write([*made, tables.everything(suite)], report / "tables" / name)
         drawn_in = report / "figures" / name
         faults = pictures.draw(suite, drawn_in / "pictures", jobs)
         drawn = figures.draw(suite, drawn_in / "pictures", drawn_in, jobs)
         if textured:
             faults += exports.write(suite, report)
-        sections.append(page.Section(report, suite, made, drawn, faults))
+        sections.append(Section(report, suite, made, drawn, faults))
     return page.write(report, folder, sections)

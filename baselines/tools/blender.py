@@ -192,7 +192,7 @@ class BlenderMinimumStretch(Waiting):
 class BlenderSmartProject(Waiting):
     """Blender's smart UV project: faces grouped by their normals, each group projected, packed.
 
-    Takes any mesh: it makes seams of its own.
+    Takes any mesh that is manifold, as Blender holds no copy of a face: it makes seams of its own.
 
     Attributes:
         angle_limit: largest angle in degrees between a face's and its group's normal.
@@ -204,7 +204,7 @@ class BlenderSmartProject(Waiting):
     island_margin: float = 0.0
     area_weight: float = 0.0
 
-    requires: ClassVar[frozenset[str]] = frozenset({"faces"})
+    requires: ClassVar[frozenset[str]] = frozenset({"faces", "manifold"})
 
     def parameterize(self, surface: Surface, *, seed: int) -> Parameterization:  # noqa: ARG002 (nothing is random)
         """The atlas in the unit square.

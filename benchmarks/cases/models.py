@@ -1,22 +1,25 @@
-"""The models of the benchmark: where each comes from, what is claimed about it, how to load it.
+"""The models of the benchmark: where each comes from, what is known about it, and how to load it.
 
-`models.json` is the registry: one entry a file, with its address at a commit, sha256, licence and
-what was measured on it. `published.json` holds the figures that papers print, by the name that a
-model has there. Which model stands for which of theirs, and how sure that is, is a model's
-`claim`: "same model", "likely" or "stand-in". No public file is proven to be the authors' own, so
-a measured figure is only judged against a published one where the claim is one of the first two.
+`models.json` is the registry. It has one entry for each file: its address at a commit, its sha256,
+its licence, and what was measured on it. `published.json` holds the figures that papers print,
+under the names that the models have there.
 
-Files come from a local mirror, if PARAPOINT_DATA names one, or from the network, once.
+A model's `claim` says how sure we are that it is the model of a paper: "same model", "likely" or
+"stand-in". No public file is proven to be the authors' own, so a measured figure is compared with a
+published one only if the claim is "same model" or "likely".
+
+Files come from a local mirror, if PARAPOINT_DATA names one. Otherwise they are downloaded once.
 """
 
 from __future__ import annotations
 
 import difflib
+import functools
 import json
 import os
 import re
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -35,8 +38,9 @@ MIRROR = "PARAPOINT_DATA"
 """Environment variable that names a folder with the registry's files, such as paper/hand_1.obj."""
 
 MOST_NOISE = 0.1
-"""Most noise that a sampled cloud may have."""
+"""The most noise that a sampled cloud may have, as a fraction of the model's diagonal."""
 CONNECT_SECONDS, READ_SECONDS = 5, 60
+"""Seconds that a server may take to answer, and then to send the next bytes."""
 
 Claim = Literal["same model", "likely", "stand-in"]
 
@@ -45,12 +49,12 @@ class PublishedFigure(NamedTuple):
     """A number that a paper prints for a model.
 
     Attributes:
-        paper_name: the model's name in that paper (in ParaPoint's, where it has several).
+        paper_name: the model's name in that paper; ParaPoint's name, if papers differ.
         method: the method as the paper calls it.
-        metric: the metric's name here.
+        metric: our name of the metric.
         value: the number as printed.
         source: paper and table.
-        note: how it was obtained, where that matters.
+        note: how it was obtained, if that matters.
     """
 
     paper_name: str
@@ -66,37 +70,33 @@ class Model:
     """An entry of the registry.
 
     Attributes:
-        name: canonical name, the file's without its ending.
-        file: path under a mirror or the cache.
-        set: the folder: paper, disk, closed, genus, cad, wild, scans or artist.
-        kind: "mesh" or "point cloud".
-        url: where it is downloaded from, at a commit.
+        name: canonical name, which is the file's without its ending.
+        file: path inside a mirror or the cache.
+        set: its folder: paper, disk, closed, genus, cad, wild, scans or artist.
+        url: the address that it is downloaded from, at a commit.
         sha256: hash of the file.
-        size: bytes.
-        licence: what its source says about it.
+        size: size of the file in bytes.
+        licence: what its source says about its licence.
         source: repository, commit and path.
         note: what is special about it.
-        tags: words to select by.
         vertices: number of vertices, or of points.
         faces: number of triangles.
         topology: as `Mesh.topology` says it, or "point cloud".
-        facts: counts and flags that were measured once (euler, genus, duplicate_vertices, ...).
-        paper_name: the model of the papers that it stands for, or "".
-        claim: how sure it is that this is that model; None without a paper_name.
-        claim_reason: why, in one sentence.
+        facts: counts and flags that were measured once, such as euler and duplicate_vertices.
+        paper_name: the model of the papers that it stands for; "" for none.
+        claim: how sure we are that it is that model; None without a paper_name.
+        claim_reason: the reason for the claim, in one sentence.
     """
 
     name: str
     file: str
     set: str
-    kind: Literal["mesh", "point cloud"]
     url: str
     sha256: str
     size: int
     licence: str
     source: str
     note: str
-    tags: tuple[str, ...]
     vertices: int
     faces: int
     topology: str
@@ -107,7 +107,7 @@ class Model:
 
     @property
     def published(self) -> tuple[PublishedFigure, ...]:
-        """Figures that papers print for the model this one stands for."""
+        """The figures that papers print for the model that this one stands for."""
         return tuple(row for row in published_figures() if row.paper_name == self.paper_name)
 
     @property
@@ -117,18 +117,18 @@ class Model:
 
 
 class MissingModelError(InputError):
-    """A model that is neither in the mirror nor to be had from the network; says how to get it."""
+    """A model is not in the mirror and cannot be downloaded; the message says how to get it."""
 
 
 def _data(name: str) -> Any:
-    """A JSON file beside this module."""
+    """The content of a JSON file next to this module."""
     return json.loads(Path(__file__).with_name(name).read_text(encoding="utf-8"))
 
 
 @cache
 def registry() -> dict[str, Model]:
     """All models by canonical name, in the order of the sets."""
-    entries = [Model(**{**entry, "tags": tuple(entry["tags"])}) for entry in _data("models.json")]
+    entries = [Model(**entry) for entry in _data("models.json")]
     return {model.name: model for model in entries}
 
 
@@ -139,7 +139,7 @@ def published_figures() -> tuple[PublishedFigure, ...]:
 
 
 def names() -> list[str]:
-    """Canonical names: the registry's, then the built-in surfaces'."""
+    """The canonical names of all models: those of the registry, then the built-in surfaces."""
     return [*registry(), *BUILTIN]
 
 
@@ -147,12 +147,12 @@ def canonical_name(case: str) -> str:
     """The full name of a model, or the path of a user's file as given.
 
     Args:
-        case: a name, any beginning that only one name has, or a path to a file. A full name goes
-            before a file of that name, a file before a beginning. With "@noise=0.01" or "@uneven"
-            after it: a cloud sampled from that model (`benchmarks.cases.builtin.sampled`).
+        case: a name, the beginning of exactly one name, or a path to a file. If more than one
+            fits, a whole name comes first, then a file. "@noise=0.01" or "@uneven" after it stands
+            for a cloud sampled from that model (`benchmarks.cases.builtin.sampled`).
 
     Raises:
-        InputError: no name or file, or a beginning of several names; no such cloud.
+        InputError: no name or file fits, several names begin so, or there is no such sampling.
     """
     known = names()
     if case in known or Path(case).is_file():
@@ -174,10 +174,10 @@ def canonical_name(case: str) -> str:
 
 
 def _sampling(how: str) -> dict[str, Any]:
-    """The arguments of `sampled` that stand after the @ of a case.
+    """The arguments of `sampled` that the text after the @ of a case asks for.
 
     Raises:
-        InputError: they cannot be read.
+        InputError: the text asks for nothing that there is.
     """
     if how == "uneven":
         return {"is_uneven": True}
@@ -196,7 +196,7 @@ def _is_sampled(name: str) -> bool:
 
 
 def is_made_in_memory(case: str) -> bool:
-    """Whether a case is a built-in surface or a sampled cloud, and no file.
+    """Whether a case is a built-in surface or a sampled cloud, rather than a file.
 
     Raises:
         InputError: as for `canonical_name`.
@@ -206,7 +206,7 @@ def is_made_in_memory(case: str) -> bool:
 
 
 def _model_name(name: str) -> str:
-    """The name of the model that a sampled cloud is made of; of all others the name itself."""
+    """The model that a sampled cloud is made from; for any other case, its own name."""
     return name.rpartition("@")[0] if _is_sampled(name) else name
 
 
@@ -224,7 +224,9 @@ def _sampled(name: str) -> tuple[PointCloud, PointCloud]:
 
 
 def exact_points(case: str) -> PointCloud | None:
-    """Where the points of a noisy sampled cloud belong, there its maps are scored; else None.
+    """The points of a noisy sampled cloud without their noise, on which its maps are scored.
+
+    None for every other case.
 
     Raises:
         InputError: as for `load`.
@@ -238,7 +240,7 @@ def exact_points(case: str) -> PointCloud | None:
 
 
 def info(case: str) -> Model | None:
-    """The registry's entry; None for a built-in surface or a user's file.
+    """The entry of a case in the registry; None for a built-in surface or a user's file.
 
     Raises:
         InputError: as for `canonical_name`.
@@ -250,9 +252,10 @@ def load(case: str) -> Surface:
     """The surface of a case: a model of the registry, a built-in surface, or a file.
 
     Raises:
-        InputError: unknown or ambiguous name; a file that cannot be read or is not the one that
-            the registry describes.
-        MissingModelError: the model is not at hand and cannot be downloaded.
+        InputError: the name is unknown or ambiguous, or the file cannot be read or is not the one
+            that the registry describes.
+        MissingModelError: the model is neither in the mirror nor in the cache, and cannot be
+            downloaded.
     """
     name = canonical_name(case)
     if name in BUILTIN:
@@ -263,12 +266,12 @@ def load(case: str) -> Surface:
 
 
 def path(case: str) -> Path:
-    """Where the file of a model is, hash checked: in the mirror, in the cache, or downloaded now.
+    """Where the file of a model is: in the mirror or the cache, its hash checked.
 
-    A user's file is where it is; of a sampled cloud it is the model's. Built-in surfaces have none.
+    A user's own file stays where it is. The file of a sampled cloud is that of its model.
 
     Raises:
-        InputError: as for `load`; or a built-in surface.
+        InputError: as for `load`, or for a built-in surface, which has no file.
         MissingModelError: as for `load`.
     """
     name = _model_name(canonical_name(case))
@@ -281,7 +284,7 @@ def path(case: str) -> Path:
 
 
 def _mirrored(model: Model) -> Path | None:
-    """The model's file in the mirror, or None without a mirror or without the file."""
+    """The model's file in the mirror; None if there is no mirror, or no such file in it."""
     mirror = os.environ.get(MIRROR)
     if not mirror:
         return None
@@ -300,16 +303,39 @@ def _mirrored(model: Model) -> Path | None:
 
 
 _unreachable: dict[str, str] = {}
-"""Hosts that did not answer in this process, and why: twenty models need not wait for one."""
+"""Hosts that have not answered this process, and why. Twenty models need not wait for one host."""
 
 
 def cache_folder() -> Path:
-    """Where downloads are kept."""
+    """The folder in which downloads are kept."""
     return Path(platformdirs.user_cache_dir("parapoint", appauthor=False))
 
 
+def _bound(model: Model, response: Any, **_: Any) -> None:
+    """Let a response hand out no more bytes than the model's file has.
+
+    Raises:
+        InputError: while it is read: there are more.
+    """
+    content = response.iter_content
+
+    def bounded(*arguments: Any, **options: Any) -> Iterator[bytes]:
+        read = 0
+        for chunk in content(*arguments, **options):
+            read += len(chunk)
+            if read > model.size:
+                response.close()
+                raise InputError(
+                    f"{model.name}: the file at {model.url} is not the registered one: "
+                    f"it has more than {model.size} bytes"
+                )
+            yield chunk
+
+    response.iter_content = bounded
+
+
 def _downloaded(model: Model) -> Path:
-    """The model's file in the cache, downloaded if it is not there."""
+    """The model's file in the cache; it is downloaded if it is not there."""
     from requests import RequestException
     from requests.exceptions import HTTPError
 
@@ -325,9 +351,13 @@ def _downloaded(model: Model) -> Path:
             path=file.parent,
             fname=file.name,
             downloader=pooch.HTTPDownloader(
-                progressbar=sys.stderr.isatty(), timeout=(CONNECT_SECONDS, READ_SECONDS)
+                progressbar=sys.stderr.isatty(),
+                timeout=(CONNECT_SECONDS, READ_SECONDS),
+                hooks={"response": functools.partial(_bound, model)},
             ),
         )
+    except InputError:  # larger than registered
+        raise
     except HTTPError as error:
         raise _missing_model(model, file, str(error)) from error
     except RequestException as error:
@@ -342,6 +372,7 @@ def _downloaded(model: Model) -> Path:
 
 
 def _missing_model(model: Model, file: Path, why: str) -> MissingModelError:
+    """The error that says why a model is missing, and how to get it."""
     return MissingModelError(
         f"model {model.name} is not at hand: {model.url} cannot be downloaded: {why}. Either set "
         f"{MIRROR} to a folder that holds {model.file}, or save that address as {file}"
@@ -349,10 +380,10 @@ def _missing_model(model: Model, file: Path, why: str) -> MissingModelError:
 
 
 def missing(cases: Iterable[str]) -> dict[str, str]:
-    """Cases that cannot be had, with the reason; all others are downloaded and at hand after it.
+    """Download all cases that are missing; those that cannot be downloaded, each with its reason.
 
     Raises:
-        InputError: unknown name; a file of the mirror or the network is not the registered one.
+        InputError: a name is unknown, or a file is not the one that the registry describes.
     """
     reasons: dict[str, str] = {}
     for case in cases:

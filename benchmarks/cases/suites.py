@@ -1,4 +1,4 @@
-"""Each table as data: which models, which methods, which seeds."""
+"""The suites as data: the models, methods and seeds of each table."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from parapoint.errors import InputError
 
 @dataclass(frozen=True)
 class Suite:
-    """A table to run.
+    """The cells of one table.
 
     Attributes:
-        name: how it is called for.
-        title: heading of its table.
+        name: its name on the command line.
+        title: the heading of its table.
         cases: canonical names of models, in the order of the rows.
         methods: specs, `name` or `name(key=value, ...)`, in the order of the columns.
-        seeds: seeds, each of which is one cell.
+        seeds: the seeds of each case and method.
     """
 
     name: str
@@ -35,20 +35,20 @@ CONFORMAL = "slim(energy=conformal)"
 
 MESH_METHODS = ("tutte", "lscm", ISOMETRIC, CONFORMAL, "xatlas")
 
-# The paper's training and ours, each with half of what one core takes for a cell of 300 seconds:
-# the suite `paper` has six of both, two at a time.
+# The paper's training and ours, each with half of the 300 seconds that one core has for a cell: the
+# suite `paper` has six cells of each, and runs two at a time.
 PAPER = "parapoint(preset=paper, time_budget=150)"
 LEARNED = "parapoint(preset=learned, time_budget=150)"
 PAPER_SHORT = "parapoint(preset=paper, points=2048, iterations=300, subset=256, all_from=0.99)"
 COMPUTED = "computed(time_budget=120)"
 COMPUTED_CONFORMAL = "computed(distortion=conformal, time_budget=120)"
-# Neural maps of other authors under the budget of PAPER: seconds, points of a step.
+# The budget of PAPER for the neural maps of other authors.
 EQUAL = "points=4096, subset=256, time_budget=150"
 
 HYBRID = "unwrap(time_budget=120)"
 LEARNED_SEAM = "unwrap(time_budget=120, price=None)"
 
-# What a user with a scan would do instead: every reconstruction with every flattening.
+# What a user with a scan would do today: every reconstruction, followed by every flattening.
 MESHED_METHODS = tuple(
     f"meshed(reconstruction={reconstruction}, flattening={flattening})"
     for reconstruction in ("poisson", "ball_pivoting")
@@ -80,12 +80,12 @@ QUALITY_CASES = (
 
 
 def ablated(option: str) -> str:
-    """The paper's preset with one option changed."""
+    """The paper's training, with one option changed."""
     return PAPER.replace(")", f", {option})")
 
 
 def members(*sets: str) -> tuple[str, ...]:
-    """Names of the models in these sets of the registry."""
+    """Names of all models in some sets of the registry."""
     return tuple(model.name for model in registry().values() if model.set in sets)
 
 
@@ -205,7 +205,7 @@ def suite(name: str) -> Suite:
     """The suite of this name.
 
     Raises:
-        InputError: there is none; the message names all.
+        InputError: there is none; the message names all suites.
     """
     if name not in SUITES:
         near = difflib.get_close_matches(name, SUITES, n=1)

@@ -35,6 +35,7 @@ from baselines import registry
 from benchmarks.cases.suites import Suite
 from benchmarks.checks import faulty, instant
 from benchmarks.running import planning, runner
+from benchmarks.store import measuring, verifying
 from benchmarks.store.results import Store
 from parapoint import console
 from parapoint.testing import irregular_disk
@@ -108,7 +109,7 @@ def toll(suite: Suite, folder: Path, *, count: int, seed: int) -> Toll:
         runner.run(suite, out, plugins=[PLUGIN])
         found.reported += len(reported)
         found.tables += 1
-        for fault in Store(out).faults():
+        for fault in verifying.faults(Store(out)):
             found.fault(f"{out.name}: {fault}")
         if _table(Store(out)) != expected:
             found.fault(f"{out.name}: another table than that of the undisturbed run")
@@ -159,13 +160,13 @@ def _check(store: Store, reported: set[str], found: Toll) -> None:
     missing = reported - {row.id for row in store.history()}
     if missing:
         found.fault(f"{store.folder.name}: {len(missing)} rows that were reported are gone")
-    for fault in store.faults():
+    for fault in verifying.faults(store):
         found.fault(f"{store.folder.name}: {fault}")
 
 
 def _table(store: Store) -> list[dict[str, Any]]:
     """Rows and metrics of a run, by cell, without what takes time."""
-    frame = store.metrics().set_index("id").drop(columns="metrics_key")
+    frame = measuring.metrics(store).set_index("id").drop(columns="metrics_key")
     metrics = {str(key): repr(value) for key, value in frame.to_dict("index").items()}
     rows = sorted(store.rows(), key=lambda row: row.cell)
     return [
@@ -185,7 +186,7 @@ def saved(models: Path, out: Path, seeds: int) -> Toll:
     plugins = [PLUGIN, f"{faulty.__file__}:Faulty"]
     runner.run(mixed, out / "mixed", plugins=plugins, jobs=2, timeout=2.0, memory=0.5)
     store = Store(out / "mixed")
-    for fault in store.faults():
+    for fault in verifying.faults(store):
         found.fault(fault)
     rows = store.rows()
     for row in rows:

@@ -60,20 +60,21 @@ def read_as(ending: str, data: bytes) -> None:
 def score(data: bytes) -> None:
     """Score `data` as an OBJ file, or as an NPZ file where it is an archive."""
     from benchmarks.commands.score import map_state
-    from benchmarks.metrics import table as metrics
+    from benchmarks.metrics import evaluation
     from parapoint.files.reading import read_point_map
 
     path = _scratch() / ("map.npz" if data.startswith(b"PK") else "map.obj")
     path.write_bytes(data)
     with contextlib.suppress(InputError):
         if path.suffix == ".npz":
-            metrics.evaluate_points(*read_point_map(path))
+            evaluation.evaluate_points(*read_point_map(path))
         else:
-            metrics.values(map_state(path))
+            evaluation.values(map_state(path))
 
 
 def store(data: bytes) -> None:
     """Read and check a results folder one file of which is `data` but for its first byte."""
+    from benchmarks.store import measuring, verifying
     from benchmarks.store.results import Store
 
     folder, row_id, surface_hash = _results()
@@ -85,9 +86,9 @@ def store(data: bytes) -> None:
     try:
         with contextlib.suppress(InputError):
             results = Store(folder)
-            list(results.faults())
+            list(verifying.faults(results))
             results.surface_hashes()
-            results.metrics()
+            measuring.metrics(results)
             with results.writing():
                 results.rows()
     finally:

@@ -29,7 +29,8 @@ from rich.table import Table
 from rich.text import Text
 
 from benchmarks.cases.suites import SUITES, Suite
-from benchmarks.metrics.table import METRICS, WITHOUT_SPANNING
+from benchmarks.metrics.metric import WITHOUT_SPANNING
+from benchmarks.metrics.table import METRICS
 from parapoint import console
 from parapoint.errors import InputError
 
@@ -268,12 +269,13 @@ def measured(suite: Suite) -> dict[str, Rows]:
     """Values of all cells of a suite by method spec; cases whose model is missing are left out."""
     from benchmarks.commands.display import Display, print_summary
     from benchmarks.running import environment, runner
+    from benchmarks.store import measuring
     from benchmarks.store.results import Store
 
     with Display() as progress:
         summary = runner.run(suite, RESULTS, progress=progress, jobs=min(environment.cores(), 8))
     print_summary(summary)
-    frame = Store(RESULTS).metrics().set_index("id")
+    frame = measuring.metrics(Store(RESULTS)).set_index("id")
     found: dict[str, Rows] = {spec: {} for spec in suite.methods}
     for row in [*summary.kept, *summary.ran]:
         if row.case not in summary.missing:

@@ -17,7 +17,7 @@ import numpy as np
 from rich.table import Table
 
 from benchmarks.cases import models
-from benchmarks.metrics.table import evaluate
+from benchmarks.metrics.evaluation import evaluate
 from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh

@@ -1,9 +1,9 @@
 """`python -m benchmarks bake`: colours of held-out points, read back from baked textures.
 
-A model is sampled, and the samples are coloured by sums of waves through space. Of the cloud a
-textured mesh is made: by ours, and as people do today, with a mesh reconstructed by MeshLab, an
-atlas of xatlas's, and at each texel the colour of the nearest point. Points that nobody saw are
-then laid onto the mesh and look up their colour in the texture.
+A model is sampled, and the samples are coloured by sums of waves through space. The cloud becomes a
+textured mesh in two ways: by the computed map, and as is usual today, by a mesh that MeshLab
+reconstructs, an atlas that xatlas makes, and the colour of the nearest point at each texel. Points
+that neither has seen are then projected onto the mesh, and read their colours from the texture.
 """
 
 from __future__ import annotations
@@ -28,18 +28,19 @@ from parapoint.textures.placing import Placing
 from parapoint.textures.texels import texels
 
 CASES = ("spot_c3d", "max_planck_i_f8000", "camelhead", "fertility")
-"""Models of which clouds are made: two closed ones, a disk, and one with handles."""
+"""Models that are sampled: two closed ones, a disk, and one with handles."""
 OURS = "computed(time_budget=60)"
+"""The method whose own bake is measured."""
 TODAY = tuple(
     f"meshed(reconstruction={reconstruction}, flattening=xatlas)"
     for reconstruction in ("poisson", "ball_pivoting")
 )
 WAVES = {"smooth": 5.0, "fine": 20.0}
-"""Most waves of the colours along the longest side of a model's box."""
+"""For each kind of colours, the most waves along the longest side of a model's bounding box."""
 POINTS, HELD_OUT, TEXELS = 50_000, 20_000, 2048
-"""Points that are seen, points that are not, and texels along a side."""
+"""Points that the texture is baked from, points that test it, and texels along a side."""
 WAVE_COUNT = 12
-"""Waves that are summed."""
+"""Number of waves that are summed."""
 
 
 class Baking(NamedTuple):
@@ -49,9 +50,9 @@ class Baking(NamedTuple):
         case: the model.
         colours: "smooth" or "fine".
         method: what made the mesh and its map.
-        psnr: of the held-out points' colours, in decibels.
+        psnr: peak signal-to-noise ratio of the held-out points' colours, in decibels.
         seconds: processor time of the bake alone.
-        reason: why there is no result, or "".
+        reason: why there is no result; "" if there is one.
     """
 
     case: str
@@ -63,7 +64,7 @@ class Baking(NamedTuple):
 
 
 class MakesTexturedMeshes(Protocol):
-    """A method that can say of which mesh its map of a cloud is."""
+    """A method that makes a mesh of a cloud, with a map of the mesh."""
 
     def charted(self, surface: PointCloud, *, seed: int) -> Charted:
         """The mesh and its map."""
@@ -71,10 +72,10 @@ class MakesTexturedMeshes(Protocol):
 
 
 def bakings(cases: tuple[str, ...] = CASES, points: int = POINTS) -> Iterator[Baking]:
-    """All rows of the table, one after the other.
+    """The rows of the table, each as soon as it is measured.
 
     Raises:
-        InputError: a case is no mesh, or there is none of that name.
+        InputError: a case is not a mesh, or is unknown.
     """
     for case in cases:
         mesh = load(case)
@@ -109,7 +110,7 @@ def bakings(cases: tuple[str, ...] = CASES, points: int = POINTS) -> Iterator[Ba
 
 
 def wave_colours(points: FloatArray, waves: float) -> FloatArray:
-    """(N, 3) colours from 0 to 1: sums of plane waves of at most so many a unit of length."""
+    """(N, 3) colours from 0 to 1: sums of plane waves, with at most `waves` in a unit of length."""
     rng = np.random.default_rng(0)
     towards = rng.normal(size=(WAVE_COUNT, 3))
     towards *= (
@@ -125,7 +126,7 @@ def wave_colours(points: FloatArray, waves: float) -> FloatArray:
 
 
 def nearest_baked(charted: Charted, cloud: PointCloud, size: int) -> Pixels:
-    """(size, size, 3) a texture with the colour of the nearest point at each texel."""
+    """(size, size, 3) a texture in which each texel has the colour of the nearest point."""
     shown = texels(charted, size)
     corners = charted.mesh.vertices[charted.mesh.faces[shown.faces]]
     places = np.einsum("nc,ncd->nd", shown.weights(slice(None)), corners)
@@ -135,7 +136,7 @@ def nearest_baked(charted: Charted, cloud: PointCloud, size: int) -> Pixels:
 
 
 def looked_up(charted: Charted, texture: Pixels, points: FloatArray) -> FloatArray:
-    """(N, 3) the texture, bilinearly, at the places of the mesh that are nearest to points."""
+    """(N, 3) colours of the texture, interpolated where the mesh is nearest to each point."""
     mesh, held = charted
     _, face, place = igl.point_mesh_squared_distance(points, mesh.vertices, mesh.faces)
     corners = [np.ascontiguousarray(mesh.vertices[mesh.faces[face, k]]) for k in range(3)]

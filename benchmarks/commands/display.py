@@ -1,4 +1,4 @@
-"""What a person sees of a run: the plan and the summary on standard output, a bar meanwhile."""
+"""What a user sees of a run: its plan, a progress bar, and its summary."""
 
 from __future__ import annotations
 
@@ -19,21 +19,24 @@ from rich.text import Text
 
 from benchmarks.running.planning import Cell
 from benchmarks.running.runner import Progress, Summary
+from parapoint.console import LONGEST_MESSAGE, printable
 
 if TYPE_CHECKING:
-    from benchmarks.store.results import ResultRow
+    from benchmarks.store.rows import ResultRow
 
 STATUSES = ("ok", "skipped", "failed", "timeout", "out_of_memory")
+"""All statuses of a row, in the order of the summary's columns."""
 BAD = STATUSES[2:]
+"""The statuses of cells that a method should have mapped and did not."""
 LISTED = 20
-"""Cells that run again, or did not end well, are listed one by one up to this many."""
+"""Number of cells that are listed one by one; of any others only the number is given."""
 
 
 class Display(Progress):
-    """Prints the plan, and shows a bar on standard error where that is a terminal."""
+    """Prints the plan of a run, and shows a bar on standard error if that is a terminal."""
 
     def __init__(self) -> None:
-        """A display that shows nothing yet; it is a context manager."""
+        """A display that shows nothing until it is entered."""
         console = Console(stderr=True)
         self._bar = Bar(
             TextColumn("{task.description}"),
@@ -58,36 +61,41 @@ class Display(Progress):
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Take the bar away."""
+        """Remove the bar."""
         self._bar.stop()
 
     def planned(self, summary: Summary) -> None:
-        """Say what is going to run, and why."""
+        """Print what the run is going to do, and why."""
         self._bar.update(self._task, total=len(summary.planned))
-        print(plan(summary), flush=True)
+        for line in plan(summary).split("\n"):
+            _say(line)
 
     def started(self, cell: Cell) -> None:
-        """Show a cell as running."""
+        """Show that a cell is running."""
         name = f"{cell.row.case} {cell.method.spec}"
         self._running[cell.row.id] = (name, time.monotonic())
 
     def ended(self, cell: Cell, row: ResultRow) -> None:
-        """Count a cell, and say if it did not end well."""
+        """Count a cell as done; on a terminal, say so if its method failed."""
         self._running.pop(row.id, None)
         self._bar.advance(self._task)
         if row.status in BAD and not self._bar.disable:
-            self._bar.console.print(escape(f"{cell.row.case} {cell.method.spec}: {ending(row)}"))
+            self._bar.console.print(
+                escape(
+                    printable(f"{cell.row.case} {cell.method.spec}: {ending(row)}", LONGEST_MESSAGE)
+                )
+            )
 
     def measured(self, done: int, total: int) -> None:
-        """Show how far the metrics are."""
+        """Show how many of the maps have been measured."""
         self._bar.update(self._task, description="metrics", completed=done, total=total)
 
     def tick(self) -> None:
-        """Show for how long the cells have been running."""
+        """Show how long each cell has been running."""
         now = time.monotonic()
         running = (f"{name} {now - began:.0f} s" for name, began in self._running.values())
         if self._running:
-            self._bar.update(self._task, description=escape(", ".join(running)))
+            self._bar.update(self._task, description=escape(printable(", ".join(running))))
 
 
 def ending(row: ResultRow) -> str:
@@ -96,7 +104,7 @@ def ending(row: ResultRow) -> str:
 
 
 def plan(summary: Summary) -> str:
-    """What a run is going to do, as one line, and a line for each cell that runs once more."""
+    """What a run is going to do: one line, and one more for each cell that it repeats."""
     suite, count = summary.suite, len(summary.planned)
     why = ", ".join(f"{number} {reason}" for reason, number in summary.reasons.most_common())
     kept = f"; {len(summary.kept)} are done already" if summary.kept else ""
@@ -112,7 +120,7 @@ def plan(summary: Summary) -> str:
 
 
 def print_summary(summary: Summary) -> None:
-    """The result of a run, method by method, then what did not end well."""
+    """Print the result of a run: a table of its methods, then each cell whose method failed."""
     table = Table(title=f"{summary.suite.name}: {summary.suite.title}", title_justify="left")
     table.add_column("method")
     used = [status for status in STATUSES if any(row.status == status for row in summary.rows)]
@@ -123,7 +131,7 @@ def print_summary(summary: Summary) -> None:
     for method, rows in _by_method(summary).items():
         counts = Counter[str](row.status for row in rows)
         table.add_row(
-            Text(method),
+            Text(printable(method)),
             *(str(counts[status]) for status in used),
             _median([row.seconds for row in rows], ".3g"),
             _median([row.peak_memory_mb for row in rows], ".0f"),
@@ -131,14 +139,14 @@ def print_summary(summary: Summary) -> None:
     print_table(table)
     bad = [row for row in summary.rows if row.status in BAD]
     for row in bad[:LISTED]:
-        print(f"{row.case}, {summary.spec(row)}: {ending(row)}")
+        _say(f"{row.case}, {summary.spec(row)}: {ending(row)}")
     if len(bad) > LISTED:
         print(f"and {len(bad) - LISTED} more that did not end well: see runs.jsonl")
     names = {row.id: f"{row.case}, {summary.spec(row)}" for row in summary.rows}
     for row_id, reason in summary.unmeasured.items():
-        print(f"{names.get(row_id, row_id)}: no metrics: {reason}")
+        _say(f"{names.get(row_id, row_id)}: no metrics: {reason}")
     for case, reason in summary.missing.items():
-        print(f"{case} is left out: {reason}")
+        _say(f"{case} is left out: {reason}")
     if summary.ran:
         harness = max(0.0, summary.seconds - summary.method_seconds)
         print(
@@ -147,8 +155,13 @@ def print_summary(summary: Summary) -> None:
         )
 
 
+def _say(line: str) -> None:
+    """Print a line with names from elsewhere in it."""
+    print(printable(line, LONGEST_MESSAGE), flush=True)
+
+
 def print_table(table: Table) -> None:
-    """Print a table: drawn on a terminal, else as tab-separated lines for other programs."""
+    """Print a table: drawn on a terminal, and as tab-separated lines anywhere else."""
     console = Console()
     if console.is_terminal:
         console.print(table)
@@ -163,7 +176,7 @@ def print_table(table: Table) -> None:
 
 
 def _by_method(summary: Summary) -> dict[str, list[ResultRow]]:
-    """Rows by method as it was asked for."""
+    """The rows of each method, under the spec that it was asked for by."""
     groups: dict[str, list[ResultRow]] = {}
     for row in summary.rows:
         groups.setdefault(summary.spec(row), []).append(row)
@@ -171,6 +184,6 @@ def _by_method(summary: Summary) -> dict[str, list[ResultRow]]:
 
 
 def _median(values: Sequence[float | None], form: str) -> str:
-    """The median of the values that are there."""
+    """The median of the values that are not None, as text."""
     known = [value for value in values if value is not None]
     return format(statistics.median(known), form) if known else "-"

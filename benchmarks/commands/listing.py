@@ -19,7 +19,7 @@ def _table(*columns: str) -> Table:
 
 
 def _add(table: Table, *texts: str) -> None:
-    """Add a row of plain texts, in which brackets are no markup."""
+    """Add a row of texts, in which rich must not take brackets for markup."""
     table.add_row(*map(Text, texts))
 
 

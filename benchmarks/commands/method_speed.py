@@ -1,9 +1,10 @@
-"""The methods' part of `python -m benchmarks speed`: what a method costs beside its library.
+"""Part of `python -m benchmarks speed`: what a method costs on top of the library that it calls.
 
-Each method is timed as the runner times it (the surface read and prepared, the library imported),
-and so is a bare call of its library on the arrays that the method hands it: no check, no start, no
-trace, no scaling. Processor time, which other programs disturb less than wall time. Blender runs in
-a process of its own, BFF is ours: neither has a bare call to be held against.
+Each method is timed as a run times it, after the surface is read and prepared and the library is
+imported. It is compared with a bare call of its library on the same arrays, without checks, initial
+map, trace or scaling. All times are processor time, which other programs disturb less than wall
+time. Two methods have no bare call to compare with: Blender runs in a process of its own, and BFF
+is our own code.
 """
 
 from __future__ import annotations
@@ -27,15 +28,17 @@ from parapoint.surfaces.preparation import prepared
 from parapoint.surfaces.surface import Mesh
 
 SIZES = (10_000, 100_000)
+"""Numbers of faces of the disks."""
 MOST_TIMES = 20
+"""How often a method is measured at most."""
 ENOUGH = 10.0
-"""CPU seconds after which a method is measured no more."""
+"""Processor time in seconds after which a method is not measured again."""
 LIMIT = 0.1
-"""What a method may take beside its library, of the library's time."""
+"""Time that a method may add to its library's, as a fraction of the library's."""
 
 Call = Callable[[], object]
 Bare = Callable[[Mesh, Parameterization], Call]
-"""The bare call of a library for a mesh, and for the map that the method made of it."""
+"""Makes the bare call of a library from a mesh and the map that the method made of it."""
 
 
 class Overhead(NamedTuple):
@@ -44,9 +47,9 @@ class Overhead(NamedTuple):
     Attributes:
         method: its spec.
         faces: number of faces.
-        bare: CPU seconds of the library alone.
-        whole: CPU seconds of the method.
-        fault: why there are no seconds; "" where there are.
+        bare: processor time of the library alone, in seconds.
+        whole: processor time of the method, in seconds.
+        fault: why there are no times; "" if there are.
     """
 
     method: str

@@ -1,7 +1,7 @@
-"""The metrics' part of `python -m benchmarks speed`: how their cost grows with the faces.
+"""Part of `python -m benchmarks speed`: how the cost of the metrics grows with the faces.
 
-Two maps of each size: a disk, and an atlas of charts of eight to ten faces. Wall time of
-`metrics.evaluate`, the best of a few runs, each on fresh objects that have nothing cached.
+Each size has two maps: a disk, and an atlas whose charts have eight to ten faces. A time is the
+best of a few calls of `evaluate`, each on new objects that have nothing cached.
 """
 
 from __future__ import annotations
@@ -17,29 +17,31 @@ import numpy as np
 from rich.table import Table
 
 from benchmarks.cases.builtin import grid_faces
-from benchmarks.metrics.table import evaluate
+from benchmarks.metrics.evaluation import evaluate
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh
 
 SIZES = (1_000, 10_000, 100_000, 1_000_000)
+"""Numbers of faces of the maps."""
 CHART_FACES = 10
+"""Faces of each chart of an atlas, at most."""
 LIMITS = {100_000: (1.0, 1.0), 1_000_000: (15.0, 6.0)}
-"""What the metrics may take: seconds and GB by number of faces."""
+"""What the metrics of a map may cost, in seconds and in GB, by its number of faces."""
 
 Kind = Literal["disk", "atlas"]
 KINDS: tuple[Kind, ...] = ("disk", "atlas")
 
 
 class Cost(NamedTuple):
-    """What all metrics of one map cost.
+    """What it costs to compute all metrics of one map.
 
     Attributes:
         kind: "disk" or "atlas".
         faces: number of faces.
         charts: number of charts.
         seconds: wall time.
-        cpu_seconds: processor time; more than the wall time if threads ran side by side.
-        gigabytes: peak memory of a process that did nothing else, imports and map included.
+        cpu_seconds: processor time, which exceeds the wall time if threads ran in parallel.
+        gigabytes: peak memory of a process that does nothing else, with its imports and the map.
     """
 
     kind: Kind
@@ -72,7 +74,7 @@ def speed_map(kind: Kind, faces: int) -> tuple[Mesh, Parameterization]:
 
 
 def metric_cost(kind: Kind, faces: int) -> Cost:
-    """What all metrics of such a map cost in this process."""
+    """What all metrics of the map `speed_map(kind, faces)` cost in this process."""
     mesh, parameterization = speed_map(kind, faces)
     seconds, cpu_seconds = np.inf, np.inf
     for _ in range(3 if faces <= SIZES[2] else 1):
@@ -89,7 +91,7 @@ def metric_cost(kind: Kind, faces: int) -> Cost:
 
 
 def metric_costs(sizes: tuple[int, ...] = SIZES) -> list[Cost]:
-    """The costs of every kind and size, each in a process of its own, so that memory is its own."""
+    """The costs of every kind and size, each measured in a process of its own, for its memory."""
     found = []
     for kind in KINDS:
         for faces in sizes:
@@ -105,7 +107,7 @@ def metric_costs(sizes: tuple[int, ...] = SIZES) -> list[Cost]:
 
 
 def metric_table(costs: list[Cost]) -> Table:
-    """The costs as a table, with the limits where there are any."""
+    """The costs as a table, next to the limits of their sizes."""
     shown = Table(title="All metrics of one map, exact overlap included", title_justify="left")
     shown.add_column("map")
     for heading in ("faces", "charts", "seconds", "CPU seconds", "GB", "µs a face", "limit"):
@@ -127,7 +129,7 @@ def metric_table(costs: list[Cost]) -> Table:
 
 
 def growth_figure(costs: list[Cost], path: Path) -> None:
-    """Draw time and memory against the number of faces, both axes logarithmic, as a PNG."""
+    """Draw time and memory against the number of faces, on logarithmic axes, into a PNG file."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9, 4), dpi=150, layout="constrained")

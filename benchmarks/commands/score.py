@@ -1,4 +1,4 @@
-"""`python -m benchmarks score`: every metric of an existing map, from whatever tool it comes."""
+"""`python -m benchmarks score`: every metric of an existing UV map, whatever tool made it."""
 
 from __future__ import annotations
 
@@ -12,20 +12,23 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from benchmarks.metrics import table as metrics
+from benchmarks.metrics import evaluation
 from benchmarks.metrics.grades import BOUNDS, grade
-from benchmarks.metrics.table import GROUPS, METRICS, WITHOUT_SPANNING, MapState
+from benchmarks.metrics.metric import GROUPS, WITHOUT_SPANNING
+from benchmarks.metrics.state import MapState
+from benchmarks.metrics.table import METRICS
 from parapoint.errors import InputError
 from parapoint.files.reading import faults_of, has_faces, read_parameterized, read_point_map
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 
 WORST = 5
-"""Faces listed as the worst, by angle and by area."""
+"""Number of faces that are listed as the worst by angle, and as the worst by area."""
 SAME_PLACE = 1e-5
-"""A reference's corners may lie this far away, over the surface's extent (as Shay et al. allow)."""
+"""How far a corner of the reference may lie from the surface's, as a fraction of the surface's
+largest extent. Shay et al. allow as much."""
 WIDTH = 160
-"""Columns of the tables where the output is no terminal."""
+"""Width of the tables in characters if the output is not a terminal."""
 
 
 @click.command()
@@ -48,12 +51,12 @@ def score(file: Path, *, reference: Path | None, as_json: bool, heatmap: Path | 
             raise InputError(f"{file}: --reference and --heatmap need a mesh, not a point cloud")
         cloud, image = read_point_map(file)
         with faults_of(file):
-            values = metrics.evaluate_points(cloud, image)
+            values = evaluation.evaluate_points(cloud, image)
         title = f"{file}: {len(cloud.points):,} points"
         state = None
     else:
         state = map_state(file, reference)
-        values = metrics.values(state)
+        values = evaluation.values(state)
         title = f"{file}: {summary(state)}"
         if heatmap is not None:
             from benchmarks.commands.heatmap import write_heatmap
@@ -75,7 +78,7 @@ def score(file: Path, *, reference: Path | None, as_json: bool, heatmap: Path | 
 
 
 def map_state(file: Path, reference: Path | None = None) -> MapState:
-    """The map in a file, and the reference of another one.
+    """The state of the map in `file`, with the map in `reference` to compare it to.
 
     Raises:
         InputError: a file cannot be read; the map has no UV area; the reference has other faces.
@@ -106,12 +109,12 @@ def same_faces(mesh: Mesh, other: Mesh) -> bool:
 
 
 def json_values(values: dict[str, float]) -> dict[str, float | str]:
-    """The values as strict JSON takes them: infinity as "inf"."""
+    """The values as strict JSON can hold them: infinity becomes "inf"."""
     return {name: value if np.isfinite(value) else str(value) for name, value in values.items()}
 
 
 def summary(state: MapState) -> str:
-    """The map in a few words."""
+    """The map in one line."""
     distortion = state.distortion
     middle = float(np.median(distortion.quasi_conformal)) if len(distortion.faces) else np.inf
     faces, topology = len(state.mesh.faces), state.mesh.topology
@@ -120,7 +123,7 @@ def summary(state: MapState) -> str:
 
 
 def tables(values: dict[str, float]) -> list[Table]:
-    """One table a group, with a column for values without spanning faces where there are any."""
+    """One table for each group of metrics. If faces span a seam, a column leaves them out."""
     spans = values.get("spanning_fraction", values.get("spanning_point_fraction", 0.0)) > 0
     found = []
     for group, title in GROUPS.items():
@@ -150,16 +153,17 @@ def tables(values: dict[str, float]) -> list[Table]:
 
 
 def _titled(title: str) -> Table:
+    """An empty table with a title."""
     return Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD)
 
 
 def number(value: float) -> str:
-    """A value to five digits; a whole one in full."""
+    """A value with five significant digits; a whole number with all of its digits."""
     return f"{value:.0f}" if abs(value) < 1e15 and value == round(value) else f"{value:.5g}"
 
 
 def worst_faces(state: MapState) -> tuple[IntArray, IntArray]:
-    """The faces worst in angle and worst in area, worst first (up to WORST each)."""
+    """The WORST faces by angle and the WORST faces by area, the worst first."""
     distortion = state.distortion
 
     def worst(values: FloatArray) -> IntArray:
@@ -169,7 +173,7 @@ def worst_faces(state: MapState) -> tuple[IntArray, IntArray]:
 
 
 def worst_table(state: MapState) -> Table:
-    """The worst faces with their distortion, chart, and what is wrong with them."""
+    """The worst faces, each with its distortion, its chart and its faults."""
     distortion = state.distortion
     row_of = np.full(len(state.mesh.faces), -1)
     row_of[distortion.faces] = np.arange(len(distortion.faces))

@@ -1,12 +1,13 @@
-"""`python -m benchmarks speed`: how much of the machine's rate the heavy parts reach.
+"""Part of `python -m benchmarks speed`: which fraction of the machine's rate training reaches.
 
-FLOPs are counted from the sizes of the layers, and rates are over processor time, all threads
-together. A shared processor's rate changes by a factor of two within seconds, for that time also:
-it serves another program on the same core. So each run stands between two large matrix products,
-and its fraction is the median, over rounds, of its rate to theirs. The bare products of its own
-layers, forward and backward, are measured in the same way; they are what a step can reach at all:
-cache misses at these sizes take a fifth to a third of the large product's rate before anything else
-is done.
+Floating-point operations are counted from the sizes of the layers. Rates are per second of
+processor time, over all threads. On a shared processor this rate, too, changes by a factor of two
+within seconds, as other programs use the same core. So each run is measured between two large
+matrix products, and its fraction is the median over several rounds of its rate divided by theirs.
+
+The bare products of the layers, forward and backward, are measured in the same way. They are the
+most that a training step can reach: at their sizes, cache misses alone cost a fifth to a third of
+the large product's rate.
 """
 
 from __future__ import annotations
@@ -28,17 +29,17 @@ PRODUCT = 2048
 MAPPED = 250_000
 """Dense points of the paper's texture mapping."""
 STEPS = (256, 512, 2048)
-"""Points of a training step."""
+"""Numbers of points of a training step."""
 FEWEST_ROUNDS, ENOUGH = 7, 10.0
-"""Rounds in which a row is measured at least, and seconds after which there are no more."""
+"""A row is measured in at least this many rounds, and for at least this many seconds."""
 
 
 class Work(NamedTuple):
-    """What is measured.
+    """A piece of work to measure.
 
     Attributes:
         run: does it once.
-        operations: FLOPs that it takes.
+        operations: floating-point operations that it takes.
     """
 
     run: Callable[[], object]
@@ -50,12 +51,13 @@ class Rate(NamedTuple):
 
     Attributes:
         what: what ran.
-        seconds: wall time of one run, the median.
-        cpu_seconds: processor time of one run, the median.
-        gflops: 1e9 operations a second of processor time, the median; multiplications and
-            additions counted apart.
-        fraction: of the rate of the matrix products before and after.
-        bare_fraction: of the rate of the bare products of its layers; NaN for the product itself.
+        seconds: median wall time of one run.
+        cpu_seconds: median processor time of one run.
+        gflops: median of 1e9 operations per second of processor time; a multiplication and an
+            addition are two operations.
+        fraction: its rate, divided by that of the matrix products before and after it.
+        bare_fraction: its rate, divided by that of the bare products of its layers; NaN for the
+            matrix product itself.
     """
 
     what: str
@@ -119,7 +121,7 @@ def training_table() -> Table:
 
 
 def _products(hidden: tuple[int, ...], rows: int, *, backward: bool) -> Work:
-    """The products of a stack 3 → 3 at so many rows."""
+    """The matrix products of layers from 3 to 3 numbers, applied to `rows` points."""
     import torch
 
     sizes = list(itertools.pairwise((3, *hidden, 3)))
@@ -136,7 +138,7 @@ def _products(hidden: tuple[int, ...], rows: int, *, backward: bool) -> Work:
 
 
 def _rate(what: str, work: Work, layers: Work, product: Work) -> Rate:
-    """The row of a work: it and the bare products of its layers against the product around them."""
+    """The row of a piece of work, measured with the bare products of its layers."""
     times = _in_turn([product, work, product, layers, product])
     before, own, between, bare, after = times[:, :, 1].T
     peak = product.operations
@@ -147,9 +149,9 @@ def _rate(what: str, work: Work, layers: Work, product: Work) -> Rate:
 
 
 def _in_turn(works: list[Work]) -> FloatArray:
-    """(rounds, works, 2) wall and processor seconds of each, one after another, round by round.
+    """(rounds, works, 2) wall and processor time of each, in seconds.
 
-    After one round that is not counted.
+    Each round does all of them one after another; a first round is not counted.
     """
     rounds: list[list[tuple[float, float]]] = []
     begun = time.perf_counter()

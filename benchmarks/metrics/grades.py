@@ -1,8 +1,8 @@
-"""Three grades, and what lies between them: whether a map may be ranked, and whether it is of use.
+"""The grade of a map: whether it may be ranked, and whether it is of use.
 
-All is read off the faces that span a seam. A **broken** map is shown and never ranked. A
-**collapsed** one is ranked in angle columns alone. A **usable** one can be taken home: "success"
-counts these. What is neither is **flawed**: it is ranked, but it is no success.
+Faces that span a seam do not count. A **broken** map is shown, and never ranked. A **collapsed**
+one is ranked by its angles alone. A **usable** one is fit for use, and counts as a success. Any
+other map is **flawed**: it is ranked, and does not count as a success.
 """
 
 from __future__ import annotations
@@ -15,17 +15,18 @@ from benchmarks.metrics.usability import LEAST_PART
 
 Grade = Literal["broken", "collapsed", "flawed", "usable"]
 GRADES: tuple[Grade, ...] = ("broken", "collapsed", "flawed", "usable")
-"""From the worst to the best."""
+"""All grades, from the worst to the best."""
 
 BROKEN = 0.05
-"""Share of the surface that may be flipped, or covered twice, before a map counts as broken."""
+"""Fraction of the surface that may be flipped, or overlapped, before a map counts as broken."""
 FLIPPED = 0.005
-"""Share of the faces that a usable map of a cloud may flip."""
+"""Fraction of the faces that a usable map of a cloud may flip."""
 OVERLAPPED = 0.01
-"""Share of the surface that a usable map of a cloud may cover twice; of the points, those that
-collide."""
+"""Fraction of the surface that a usable map of a cloud may overlap. For a cloud without faces, the
+fraction of the points that may collide."""
 STARVED_SHARE = 0.02
-"""Share of the surface that a usable map may starve (see `benchmarks.metrics.usability`)."""
+"""Fraction of the surface that may be starved in a usable map: that may get less than a quarter of
+its fair area (see `benchmarks.metrics.usability`)."""
 
 BOUNDS = (
     f"broken: more than {BROKEN:.0%} of the surface flipped or overlapped, or not finite; "
@@ -33,16 +34,16 @@ BOUNDS = (
     f"fair area; usable: no flips and overlaps (of a cloud at most {FLIPPED:.1%} and "
     f"{OVERLAPPED:.0%}), nothing collapsed, at most {STARVED_SHARE:.0%} starved; flawed: the rest"
 )
-"""The grades in one line, for the notes of a table."""
+"""What the grades mean, in one line for the notes of a table."""
 
 
 def grade(values: Mapping[str, float], *, of_cloud: bool) -> Grade:
-    """The grade of a map with these metrics (`benchmarks.metrics.table.evaluate` and `_points`).
+    """The grade of a map whose metrics (`benchmarks.metrics.evaluation`) are given.
 
     Args:
         values: metrics by name.
-        of_cloud: whether the map is made of points alone, so that a few flips are forgiven; False
-            for a method that was given the faces.
+        of_cloud: whether the method was given points without faces, so that a few flips are
+            forgiven.
 
     Raises:
         KeyError: a metric that the grade needs is missing.
@@ -74,7 +75,7 @@ def grade(values: Mapping[str, float], *, of_cloud: bool) -> Grade:
 
 
 def _grade_of_points(values: Mapping[str, float]) -> Grade:
-    """The grade of a map of a cloud without faces: collisions of points stand for overlaps."""
+    """The grade of a map of a cloud without faces; collisions of points count as overlaps."""
     collided = values["uv_collision_fraction"]
     if not (math.isfinite(values["local_quasi_conformal_mean"]) and collided <= BROKEN):
         return "broken"

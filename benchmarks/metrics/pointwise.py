@@ -19,9 +19,12 @@ from benchmarks.metrics.seams import QUARTILE, SPANNING_LENGTH, SPANNING_STRETCH
 from benchmarks.metrics.usability import LEAST_PART, STARVED
 from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import PointParameterization
+from parapoint.surfaces.scan_lines import breadth
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, PointCloud
 
 NEIGHBOURS = 8
+WIDER = 1.5
+"""A neighbourhood on scan lines holds so many times the points that are just enough to spread."""
 SEAM_NEIGHBOURS = 3
 """K_cut of ParaPoint; T_cut is `SPANNING_LENGTH`."""
 RANKED_POINTS = 20_000
@@ -68,14 +71,31 @@ class PointMap:
         return nearest_others(self.uv_tree, self.k)
 
     @cached_property
+    def around(self) -> IntArray:
+        """(P, k) the neighbours, or others that lie to all sides where these are on a scan line.
+
+        There k are taken evenly, by their rank, from the nearest that spread over the surface
+        (`parapoint.surfaces.scan_lines`).
+        """
+        if (count := breadth(self.points)) is None:
+            return self.neighbours
+        around = self.neighbours.copy()
+        for most in np.unique(count[count > self.k]):
+            rows = np.flatnonzero(count == most)
+            rank = np.round(np.linspace(most / self.k, WIDER * most, self.k)).astype(np.int64)
+            around[rows] = self.tree.query(self.points[rows], rank + 1)[1]
+        return around
+
+    @cached_property
     def singular_values(self) -> FloatArray:
         """(P, 2) singular values, larger first, of the least-squares J at each point.
 
         J maps offsets within the tangent plane, spanned by the two main directions of the
         neighbourhood, to UV offsets. (0, 0) where the neighbourhood spans no plane.
         """
-        offsets = self.points[self.neighbours] - self.points[:, None]
-        images = self.uv[self.neighbours] - self.uv[:, None]
+        around = self.around
+        offsets = self.points[around] - self.points[:, None]
+        images = self.uv[around] - self.uv[:, None]
         _, spread, axes = np.linalg.svd(offsets, full_matrices=False)
         planar = spread[:, 1] > 1e-9 * np.maximum(spread[:, 0], np.finfo(np.float64).tiny)
         local = offsets[planar] @ axes[planar, :2].transpose(0, 2, 1)

@@ -1,288 +1,49 @@
-"""The registry of metrics, and the values of all of them for one map.
+"""The registry of metrics. Each metric has its entry here, and nowhere else.
 
-METRICS holds every name that a table, a JSON object or `metrics.parquet` may have, with its label,
-unit, direction, ideal, weighting, normalization and source; nothing else defines a metric. Each
-distortion metric stands twice: over all faces, and `_without_spanning` over the map restricted to
-the faces that span no seam (`benchmarks.metrics.seams`), normalized over these alone.
+METRICS holds every name that a table, a JSON object or `metrics.parquet` may have. Each distortion
+metric has two entries. The second, `_without_spanning`, leaves out the faces that span a seam
+(`benchmarks.metrics.seams`) and is normalized over the others.
+
+To add a metric, write the function that computes it, and add its entry here.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
-from typing import Any, Literal
+from dataclasses import replace
+from functools import partial
+from typing import Any
 
-import numpy as np
-
-from benchmarks.metrics import distortion, pointwise, seams, usability, validity
-from benchmarks.metrics.distortion import FaceDistortion, Triangles, face_distortion, triangles
-from benchmarks.metrics.welding import scored
-from parapoint.errors import InputError
-from parapoint.surfaces.parameterization import Parameterization, PointParameterization
-from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, PointCloud
-
-WITHOUT_SPANNING = "_without_spanning"
-
-Group = Literal[
-    "conformal", "authalic", "isometric", "validity", "use", "seams", "reference", "points"
-]
-GROUPS: dict[Group, str] = {
-    "conformal": "angles",
-    "authalic": "areas",
-    "isometric": "lengths",
-    "validity": "flipped, degenerate and overlapping faces",
-    "use": "the worst part, and what a texture needs",
-    "seams": "seams, charts, packing",
-    "reference": "against the reference map",
-    "points": "point cloud, no mesh",
-}
-"""Each group of metrics, in the order of the tables, and its title."""
+from benchmarks.metrics import distortion, pointwise, reference, seams, usability, validity
+from benchmarks.metrics.metric import WITHOUT_SPANNING, Group, Metric
 
 
-@dataclass(frozen=True, kw_only=True)
-class Metric:
-    """A metric: what it is called, how to read it, where it comes from, how it is computed.
+def _entries(group: Group, part: str, *, twice: bool = False) -> Callable[..., list[Metric]]:
+    """A function that makes the entries of a metric, which is named like the function it calls.
 
-    Attributes:
-        name: key in results.
-        label: short heading of a table column.
-        group: which table it belongs to.
-        function: its value, from a MapState (group "points": from a PointMap).
-        weighting: how faces (corners, points) are weighted.
-        source: who defined it so.
-        unit: "radians", "faces", ... or "" for a pure number.
-        normalization: what the value is relative to; printed with the heading.
-        better: which way is better.
-        ideal: value of a perfect map, None where there is none that a map can reach.
+    Args:
+        group: the table that it belongs to.
+        part: the attribute of a MapState that the function takes; "" for the state itself.
+        twice: whether a second entry leaves out the faces that span a seam.
     """
 
-    name: str
-    label: str
-    group: Group
-    function: Callable[[Any], float]
-    weighting: str
-    source: str
-    unit: str = ""
-    normalization: str = ""
-    better: Literal["lower", "higher"] = "lower"
-    ideal: float | None = 0.0
+    def entries(function: Callable[[Any], float], label: str, **about: Any) -> list[Metric]:
+        def value(part: str, state: Any) -> float:
+            return function(getattr(state, part) if part else state)
 
-    @property
-    def heading(self) -> str:
-        """Label, unit and normalization: nobody has to guess."""
-        notes = ", ".join(note for note in (self.unit, self.normalization) if note)
-        return f"{self.label} ({notes})" if notes else self.label
+        name, of_all = function.__name__, partial(value, part)
+        everywhere = Metric(name=name, label=label, group=group, function=of_all, **about)
+        if not twice:
+            return [everywhere]
+        other = replace(
+            everywhere,
+            name=name + WITHOUT_SPANNING,
+            label=f"{label} without spanning faces",
+            function=partial(value, part + WITHOUT_SPANNING),
+        )
+        return [everywhere, other]
 
-
-@dataclass(frozen=True, eq=False)
-class MapState:
-    """A map with all that more than one metric needs, each computed once and when asked for.
-
-    Faces that the map leaves out (NaN) are left out here too, and vertices at one place are welded.
-
-    Attributes:
-        mesh: the surface.
-        parameterization: the map.
-        reference: another map of the same faces, or None.
-        coverage: share of the surface, from 0 to 1, that the map covers.
-        welded: number of vertices that lie where another one does.
-
-    Raises:
-        InputError: a map has another number of faces than the mesh.
-    """
-
-    mesh: Mesh
-    parameterization: Parameterization
-    reference: Parameterization | None = None
-    coverage: float = field(init=False, default=1.0)
-    welded: int = field(init=False, default=0)
-
-    def __post_init__(self) -> None:
-        for name, of in (("map", self.parameterization), ("reference", self.reference)):
-            if of is not None and len(of.corners) != len(self.mesh.faces):
-                raise InputError(
-                    f"the {name} has {len(of.corners)} faces, the mesh {len(self.mesh.faces)}; "
-                    "both must have the same faces in the same order"
-                )
-        found = scored(self.mesh, self.parameterization, self.reference)
-        for name, value in found._asdict().items():
-            object.__setattr__(self, name, value)
-
-    @cached_property
-    def triangles(self) -> Triangles:
-        """Every face before normalization."""
-        return triangles(self.mesh, self.parameterization)
-
-    @cached_property
-    def spanning(self) -> BoolArray:
-        """(F,) whether a face spans a seam."""
-        overlapped = self.validity.overlaps.overlapped
-        return seams.spanning_faces(self.mesh, self.parameterization, overlapped)
-
-    @cached_property
-    def distortion(self) -> FaceDistortion:
-        """Distortion of all faces with 3D area."""
-        return face_distortion(self.triangles)
-
-    @cached_property
-    def distortion_without_spanning(self) -> FaceDistortion:
-        """Distortion of those of them that span no seam."""
-        if not self.spanning.any():
-            return self.distortion
-        return face_distortion(self.triangles, ~self.spanning)
-
-    @cached_property
-    def validity_without_spanning(self) -> validity.Validity:
-        """State of the validity metrics over the faces that span no seam."""
-        return self.validity.of(~self.spanning) if self.spanning.any() else self.validity
-
-    @cached_property
-    def validity(self) -> validity.Validity:
-        """State of the validity metrics."""
-        return validity.Validity(self.parameterization, self.triangles)
-
-    @cached_property
-    def worst(self) -> usability.Worst:
-        """State of the metrics of starved parts."""
-        return usability.Worst(self.mesh, self.distortion)
-
-    @cached_property
-    def worst_without_spanning(self) -> usability.Worst:
-        """The same over the faces that span no seam."""
-        if not self.spanning.any():
-            return self.worst
-        return usability.Worst(self.mesh, self.distortion_without_spanning)
-
-    @cached_property
-    def layout(self) -> usability.Layout:
-        """State of the metrics of the seam's shape and of the unit square."""
-        return usability.Layout(self.mesh, self.parameterization, self.triangles)
-
-    @cached_property
-    def seams(self) -> seams.Seams:
-        """State of the metrics of seams, charts and packing."""
-        return seams.Seams(self.mesh, self.parameterization, self.triangles, self.validity.overlaps)
-
-    @cached_property
-    def reference_state(self) -> MapState:
-        """The reference map with what its metrics need.
-
-        Raises:
-            InputError: there is no reference.
-        """
-        if self.reference is None:
-            raise InputError("this metric needs a reference map")
-        return MapState(self.mesh, self.reference)
-
-
-def coverage(state: MapState | pointwise.PointMap) -> float:
-    """Share of the surface's area (of a cloud: of its points) that has a uv, from 0 to 1."""
-    return state.coverage
-
-
-def spanning_fraction(state: MapState) -> float:
-    """Fraction of the faces that span a seam."""
-    return float(state.spanning.mean())
-
-
-def artist_correlation(state: MapState) -> float:
-    """abs(rho - 1), rho the correlation of log sigma with the reference, by area (Shay et al.).
-
-    Both singular values of each face count; faces degenerate in either map are left out. A map
-    without any variation of sigma correlates perfectly with another such map, else not at all.
-    inf where no face is left.
-    """
-    ours, theirs = state.triangles, state.reference_state.triangles
-    kept = ~(ours.degenerate_3d | ours.degenerate_uv | theirs.degenerate_uv)
-    if not kept.any():
-        return float("inf")
-    weights = np.tile(ours.area[kept] / ours.area[kept].sum() / 2, 2)
-
-    def centred(of: Triangles) -> FloatArray:
-        logs = np.log(np.concatenate([of.sigma1[kept], of.sigma2[kept]]))
-        return np.asarray(logs - weights @ logs)
-
-    a, b = centred(ours), centred(theirs)
-    a_variance, b_variance = float(weights @ a**2), float(weights @ b**2)
-    # Deviations of less than 1e-12 are rounding: an isometry.
-    constant = (a_variance < 1e-24, b_variance < 1e-24)
-    if any(constant):
-        return 0.0 if all(constant) else 1.0
-    return abs(float(weights @ (a * b)) / float(np.sqrt(a_variance * b_variance)) - 1)
-
-
-def seam_excess(state: MapState) -> float:
-    """Seam length beyond that of the reference, 0 if it is no longer (Shay et al.)."""
-    ours = seams.seam_length(state.seams)
-    theirs = seams.seam_length(state.reference_state.seams)
-    return max(ours - theirs, 0.0) if ours < np.inf else ours
-
-
-def _twice(everywhere: Metric, without: Callable[[MapState], float]) -> list[Metric]:
-    """A metric over all faces, and over those that span no seam."""
-    name, label = everywhere.name + WITHOUT_SPANNING, everywhere.label + " without spanning faces"
-    return [everywhere, replace(everywhere, name=name, label=label, function=without)]
-
-
-def _of_distortion(
-    group: Group, function: Callable[[FaceDistortion], float], label: str, **about: Any
-) -> list[Metric]:
-    """A metric of that name over all faces, and over those that span no seam."""
-    everywhere = Metric(
-        name=function.__name__,
-        label=label,
-        group=group,
-        function=lambda state: function(state.distortion),
-        **about,
-    )
-    return _twice(everywhere, lambda state: function(state.distortion_without_spanning))
-
-
-def _of_validity(
-    function: Callable[[validity.Validity], float], label: str, **about: Any
-) -> list[Metric]:
-    name, of = function.__name__, lambda state: function(state.validity)
-    return [Metric(name=name, label=label, group="validity", function=of, **about)]
-
-
-def _of_validity_twice(
-    function: Callable[[validity.Validity], float], label: str, **about: Any
-) -> list[Metric]:
-    """A metric of that name over all faces, and over those that span no seam."""
-    (everywhere,) = _of_validity(function, label, **about)
-    return _twice(everywhere, lambda state: function(state.validity_without_spanning))
-
-
-def _of_worst(
-    function: Callable[[usability.Worst], float], label: str, **about: Any
-) -> list[Metric]:
-    """A metric of that name over all faces, and over those that span no seam."""
-    everywhere = Metric(
-        name=function.__name__,
-        label=label,
-        group="use",
-        function=lambda state: function(state.worst),
-        **about,
-    )
-    return _twice(everywhere, lambda state: function(state.worst_without_spanning))
-
-
-def _of_layout(
-    function: Callable[[usability.Layout], float], label: str, **about: Any
-) -> list[Metric]:
-    name, of = function.__name__, lambda state: function(state.layout)
-    return [Metric(name=name, label=label, group="use", function=of, **about)]
-
-
-def _of_seams(function: Callable[[seams.Seams], float], label: str, **about: Any) -> list[Metric]:
-    name, of = function.__name__, lambda state: function(state.seams)
-    return [Metric(name=name, label=label, group="seams", function=of, **about)]
-
-
-def _of_map(group: Group, function: Callable[[Any], float], label: str, **about: Any) -> Metric:
-    name = function.__name__
-    return Metric(name=name, label=label, group=group, function=function, **about)
+    return entries
 
 
 _CORNERS = {"weighting": "corners, unweighted", "source": "ParaPoint, supplement; FAM"}
@@ -301,7 +62,8 @@ _TORN = "without points where the map tears"
 
 
 def _conformal() -> list[Metric]:
-    of, d = partial(_of_distortion, "conformal"), distortion
+    """Metrics of angles."""
+    of, d = _entries("conformal", "distortion", twice=True), distortion
     label = "angle difference"
     return [
         *of(d.angle_difference_mean, f"{label}, mean", **_CORNERS, **_RADIANS),
@@ -328,7 +90,8 @@ def _conformal() -> list[Metric]:
 
 
 def _authalic() -> list[Metric]:
-    of, d = partial(_of_distortion, "authalic"), distortion
+    """Metrics of areas."""
+    of, d = _entries("authalic", "distortion", twice=True), distortion
     return [
         *of(
             d.area_discrepancy_total,
@@ -349,7 +112,8 @@ def _authalic() -> list[Metric]:
 
 
 def _isometric() -> list[Metric]:
-    of, d = partial(_of_distortion, "isometric"), distortion
+    """Metrics of lengths."""
+    of, d = _entries("isometric", "distortion", twice=True), distortion
     mean, largest = _AREA | _SCALED, _LARGEST | _SCALED
     return [
         *of(
@@ -383,7 +147,9 @@ def _isometric() -> list[Metric]:
 
 
 def _validity() -> list[Metric]:
-    of, twice, v = _of_validity, _of_validity_twice, validity
+    """Metrics of flipped, degenerate and overlapping faces."""
+    of, v = _entries("validity", "validity"), validity
+    twice = _entries("validity", "validity", twice=True)
     count = _FACES | {"weighting": "count", "unit": "faces"}
     return [
         *twice(
@@ -447,7 +213,9 @@ def _validity() -> list[Metric]:
 
 
 def _use() -> list[Metric]:
-    worst, layout, u = _of_worst, _of_layout, usability
+    """Metrics of the worst part, and of what a texture needs."""
+    worst, u = _entries("use", "worst", twice=True), usability
+    layout = _entries("use", "layout")
     ratio = {"normalization": "r = a/A, areas sum to 1"}
     return [
         *worst(
@@ -496,10 +264,11 @@ def _use() -> list[Metric]:
             source="this project",
             normalization="fraction of the UV area that turns against the faces",
         ),
-        _of_map(
-            "use",
-            coverage,
-            "coverage",
+        Metric(
+            name="coverage",
+            label="coverage",
+            group="use",
+            function=lambda state: state.coverage,
             **_AREA,
             source="this project",
             normalization="fraction of the area (of a cloud: of the points) with a uv",
@@ -510,13 +279,16 @@ def _use() -> list[Metric]:
 
 
 def _seams() -> list[Metric]:
-    of, s = _of_seams, seams
+    """Metrics of seams, charts and packing."""
+    of, s = _entries("seams", "seams"), seams
     return [
-        _of_map(
-            "seams",
-            spanning_fraction,
-            "faces that span a seam",
-            **_FACES,
+        Metric(
+            name="spanning_fraction",
+            label="faces that span a seam",
+            group="seams",
+            function=lambda state: float(state.spanning.mean()),
+            weighting="faces, unweighted",
+            source="this project",
             normalization="fraction of all faces",
         ),
         *of(s.chart_count, "charts", weighting="count", source="PartUV", ideal=1.0),
@@ -550,65 +322,72 @@ def _seams() -> list[Metric]:
 
 
 def _reference() -> list[Metric]:
-    of = partial(_of_map, "reference")
+    """Metrics against the reference map."""
+    of = _entries("reference", "")
     return [
-        of(artist_correlation, "|ρ(log σ, log σ of reference) - 1|", **_AREA, source=_SHAY),
-        of(seam_excess, "seam length beyond the reference's", **_SEAM),
+        *of(
+            reference.artist_correlation,
+            "|ρ(log σ, log σ of reference) - 1|",
+            **_AREA,
+            source=_SHAY,
+        ),
+        *of(reference.seam_excess, "seam length beyond the reference's", **_SEAM),
     ]
 
 
 def _points() -> list[Metric]:
-    of, p = partial(_of_map, "points"), pointwise
+    """Metrics of a map of a point cloud."""
+    of, p = _entries("points", ""), pointwise
     share = _POINTS | {"normalization": "fraction of the points"}
     return [
-        of(p.local_quasi_conformal_mean, "local σ1/σ2, mean", **_POINTS, ideal=1.0),
-        of(
+        *of(p.local_quasi_conformal_mean, "local σ1/σ2, mean", **_POINTS, ideal=1.0),
+        *of(
             p.local_quasi_conformal_mean_without_spanning,
             "local σ1/σ2, mean",
             **_POINTS,
             normalization=_TORN,
             ideal=1.0,
         ),
-        of(
+        *of(
             p.local_area_log_ratio_mean,
             "local |log σ1σ2|, mean",
             **_POINTS,
             normalization="from its median",
         ),
-        of(
+        *of(
             p.local_area_log_ratio_mean_without_spanning,
             "local |log σ1σ2|, mean",
             **_POINTS,
             normalization=f"from its median, {_TORN}",
         ),
-        of(
+        *of(
             p.neighbour_preservation,
             "neighbours preserved",
             **_RANKS,
             normalization="the smaller of the next two",
         ),
-        of(p.neighbour_trustworthiness, "trustworthiness", **_RANKS, normalization="k = 8"),
-        of(p.neighbour_continuity, "continuity", **_RANKS, normalization="k = 8"),
-        of(
+        *of(p.neighbour_trustworthiness, "trustworthiness", **_RANKS, normalization="k = 8"),
+        *of(p.neighbour_continuity, "continuity", **_RANKS, normalization="k = 8"),
+        *of(
             p.point_part_area_ratio_min,
             "smallest mean r of a starved part",
             **_POINTS | {"better": "higher", "ideal": 1.0},
             normalization="r = local area / mean; parts with r < 1/4 of 1 % of the points",
         ),
-        of(
+        *of(
             p.starved_point_fraction,
             "starved points",
             **_POINTS,
             normalization="fraction with a local area below a quarter of the mean",
         ),
-        of(p.uv_collision_fraction, "UV collisions", **share),
-        of(
+        *of(p.uv_collision_fraction, "UV collisions", **share),
+        *of(
             p.seam_point_fraction,
             "seam points, K = 3, T = 1 % of L",
             **share | {"source": "ParaPoint, seam extraction"},
             ideal=None,
         ),
-        of(p.spanning_point_fraction, "points where the map tears", **share, ideal=None),
+        *of(p.spanning_point_fraction, "points where the map tears", **share, ideal=None),
     ]
 
 
@@ -625,42 +404,4 @@ METRICS: dict[str, Metric] = {
         *_points(),
     )
 }
-
-
-def evaluate(
-    mesh: Mesh, parameterization: Parameterization, reference: Parameterization | None = None
-) -> dict[str, float]:
-    """Every metric of a map of a mesh, by name; never nan.
-
-    Args:
-        mesh: the surface, as it was before any cut: seams are where the map leaves its edges.
-        parameterization: the map, its faces in the order of the mesh.
-        reference: another map of the same faces; without it the group "reference" is left out.
-
-    Raises:
-        InputError: a map has another number of faces than the mesh.
-    """
-    return values(MapState(mesh, parameterization, reference))
-
-
-def values(state: MapState) -> dict[str, float]:
-    """Every metric that `state` can have, by name."""
-    found: dict[str, float] = {}
-    for name, metric in METRICS.items():
-        if metric.group == "points" or (metric.group == "reference" and state.reference is None):
-            continue
-        everywhere = name.removesuffix(WITHOUT_SPANNING)
-        same = everywhere in found and state.distortion_without_spanning is state.distortion
-        found[name] = found[everywhere] if same else metric.function(state)
-    return found
-
-
-def evaluate_points(cloud: PointCloud, parameterization: PointParameterization) -> dict[str, float]:
-    """Every metric of the group "points", and `coverage`, by name; never nan.
-
-    Raises:
-        InputError: the numbers of points differ, or there are fewer than four.
-    """
-    state = pointwise.point_map(cloud, parameterization)
-    of_points = [metric for metric in METRICS.values() if metric.group == "points"]
-    return {m.name: m.function(state) for m in (*of_points, METRICS["coverage"])}
+"""Every metric by name, in the order of the tables."""

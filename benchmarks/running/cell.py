@@ -32,8 +32,9 @@ from benchmarks.store.archives import (
     trace_arrays,
     write_arrays,
 )
+from benchmarks.store.measuring import measured
 from benchmarks.store.records import plain
-from benchmarks.store.results import MISSING, SOURCE_CHANGED, Status, measured
+from benchmarks.store.rows import MISSING, SOURCE_CHANGED, Status
 from parapoint.errors import InputError
 from parapoint.method import MissingError, UnsupportedError
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization
@@ -84,7 +85,7 @@ def _done(job: Job, send: int) -> Outcome:
             return run(job, send)
         case MeasureJob():
             return measure(job)
-    raise TypeError(f"{type(job).__name__} is no job to do")
+    raise TypeError(f"a cell cannot do a {type(job).__name__}")
 
 
 def _tell(send: int, message: Prepared | Outcome) -> None:

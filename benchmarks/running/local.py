@@ -69,7 +69,7 @@ class _Slot:
         self.printed = bytearray()
         self.ready = False
         self.task: Task | None = None
-        self.folder = Path()
+        self.folder: Path | None = None  # never the working directory: `_end` removes it
         self.started = math.inf
 
     @property
@@ -263,8 +263,9 @@ class Local:
         Raises:
             InputError: this machine failed, so that the run cannot go on.
         """
-        task = slot.task
+        task, folder = slot.task, slot.folder
         assert task is not None
+        assert folder is not None
         slot.task = None
         if outcome.fatal:
             raise InputError(
@@ -272,8 +273,8 @@ class Local:
             )
         took, printed = time.monotonic() - slot.started, last_lines(slot.printed)
         outcome = dataclasses.replace(outcome, took=took, printed=printed)
-        task.ended(outcome, slot.folder / "map.npz")
-        shutil.rmtree(slot.folder, ignore_errors=True)
+        task.ended(outcome, folder / "map.npz")
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def last_lines(printed: bytes | bytearray, lines: int = 20, characters: int = 4000) -> str:

@@ -15,9 +15,11 @@ from benchmarks.cases.suites import Suite
 from benchmarks.running import environment
 from benchmarks.running.cluster import WORKER_LOST
 from benchmarks.store.records import plain
-from benchmarks.store.results import MISSING, SOURCE_CHANGED, ResultRow, Store, identity
+from benchmarks.store.results import Store
+from benchmarks.store.rows import MISSING, SOURCE_CHANGED, ResultRow, identity
 from parapoint.errors import InputError
 from parapoint.files.reading import faults_of, read_parameterized
+from parapoint.parameters import LARGEST_SEED, check_whole
 from parapoint.sources import source_hash
 
 SLOW = ("torch", "pymeshlab")
@@ -74,7 +76,7 @@ def choice(
     """The suite that was asked for, every name in it checked, and its methods.
 
     Raises:
-        InputError: a name is unknown, or a plugin cannot be read.
+        InputError: a name is unknown, a plugin cannot be read, or a seed is out of range.
     """
     added = [registry.register_plugin(plugin) for plugin in plugins]
     chosen = []
@@ -88,6 +90,8 @@ def choice(
     asked = suite.cases if cases is None else cases
     names = tuple(dict.fromkeys(models.canonical_name(case) for case in asked))
     asked_seeds = suite.seeds if seeds is None else tuple(dict.fromkeys(seeds))
+    for seed in asked_seeds:
+        check_whole("a seed", seed, 0, LARGEST_SEED)
     specs = tuple(method.spec for method in chosen)
     return dataclasses.replace(suite, cases=names, methods=specs, seeds=asked_seeds), chosen
 

@@ -19,7 +19,10 @@ from benchmarks.cases.suites import Suite
 from benchmarks.running import environment, executors, planning, scratch
 from benchmarks.running.planning import Cell, Chosen
 from benchmarks.running.tasks import Executor, MeasureJob, Outcome, RunJob, Task
-from benchmarks.store.results import ResultRow, Store
+from benchmarks.store import measuring
+from benchmarks.store.results import Store
+from benchmarks.store.rows import ResultRow
+from parapoint.parameters import LONGEST_SECONDS, check_number, check_whole
 
 TIME_LIMIT = 1800.0
 """Wall time in seconds that a cell may take, where the user sets no other limit."""
@@ -27,6 +30,10 @@ METRICS_TIME_LIMIT = 120.0
 """Wall time in seconds that the metrics of one map may take; 100,000 faces take a few seconds."""
 MEMORY_SHARE = 0.8
 """Fraction of the machine's memory that all cells together may hold, if the user sets no limit."""
+MOST_JOBS = 4096
+"""Most cells that may be asked to run at a time."""
+MOST_MEMORY = 1e6
+"""Most memory, in GB, that a cell may be allowed to hold."""
 MAPS_PER_WORKER = 4
 """Maps to measure that justify another supervisor, which takes a second to start."""
 
@@ -129,12 +136,16 @@ def run(
         progress: hears how the run goes.
 
     Raises:
-        InputError: a name is unknown, a file cannot be read, the folder is in use or from a newer
-            version, the disk is full, or the executor is not available. In the first two cases
-            nothing has been written.
+        InputError: a number is out of range, a name is unknown, a file cannot be read, the folder
+            is in use or from a newer version, the disk is full, or the executor is not available.
+            In the first three cases nothing has been written.
     """
     began = time.monotonic()
     progress = progress or Progress()
+    check_whole("jobs", jobs, 1, MOST_JOBS)
+    check_number("timeout", timeout, most=LONGEST_SECONDS, above=True)
+    if memory is not None:
+        check_number("memory", memory, most=MOST_MEMORY, above=True)
     suite, chosen = planning.choice(suite, methods, cases, seeds, plugins)
     store = Store(folder)
     workers = executors.executor(
@@ -172,7 +183,7 @@ def _measure(
     store: Store, workers: Executor, memory: float | None, summary: Summary, progress: Progress
 ) -> None:
     """Bring the metrics up to date. Each map has a process of its own: a wild one may kill it."""
-    rows = store.unmeasured()
+    rows = measuring.unmeasured(store)
     values: dict[str, dict[str, float]] = {}
     jobs = min(workers.width, 1 + len(rows) // MAPS_PER_WORKER)
     memory_limit = _memory_limit(memory, jobs)
@@ -197,7 +208,7 @@ def _measure(
         )
         tasks.append(Task(job, began, functools.partial(ended, row)))
     workers.run(tasks, jobs)
-    store.metrics(values)
+    measuring.metrics(store, values)
 
 
 def _job(

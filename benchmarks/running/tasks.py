@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Protocol, Self, TypeVar
 
 from benchmarks.store.records import fields_of, from_fields, loaded
-from benchmarks.store.results import Status
+from benchmarks.store.rows import Status
 
 Tick = Callable[[], None]
 

@@ -82,7 +82,7 @@ def main() -> None:
     while line := jobs.readline():
         job = from_json(line, RunJob, MeasureJob)
         if isinstance(job, MeasureJob):
-            importlib.import_module("benchmarks.metrics.table")  # once, before the forks
+            importlib.import_module("benchmarks.metrics.evaluation")  # once, before the forks
         outcome = _supervised(job, wake, [reply, wake, waker, jobs.fileno()])
         os.write(reply, to_json(outcome))
 
@@ -194,7 +194,7 @@ def _start(job: Job, send: int, private: list[int]) -> int:
 def _said(content: bytes | bytearray) -> tuple[str, Outcome | None]:
     """What a child sent, in whole lines: what was done to its surface, and how it ended.
 
-    Lines that are no message are left out: a method may have written into the pipe.
+    Any other line is ignored: the method may have written it into the pipe.
     """
     preprocessing, outcome = "", None
     for line in bytes(content).split(b"\n")[:-1]:

@@ -1,4 +1,4 @@
-"""The files of a result store: arrays in npz files, written all or nothing; none is unpickled."""
+"""Arrays in npz files: how surfaces and maps are stored. No file is ever unpickled."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import errno
 import hashlib
 import math
 import os
+import re
 import typing
 import zipfile
 import zlib
@@ -21,12 +22,14 @@ from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization, TracePoint
 from parapoint.surfaces.surface import Mesh, PointCloud, Surface
 
+HASH = re.compile(r"[0-9a-f]{8,64}")
+"""What a hash, and so the name of a file in the store, looks like."""
 Arrays = Mapping[str, npt.NDArray[Any]]
 _DAMAGE = (
     *(OSError, EOFError, ValueError, TypeError, AttributeError, KeyError, MemoryError),
     *(NotImplementedError, zipfile.BadZipFile, zlib.error),
 )
-"""What reading a damaged archive raises."""
+"""Errors that reading a damaged archive can raise."""
 
 
 def arrays_hash(arrays: Arrays) -> str:
@@ -48,14 +51,14 @@ def surface_arrays(surface: Surface) -> dict[str, npt.NDArray[Any]]:
 
 
 def map_arrays(result: Parameterization | PointParameterization) -> dict[str, npt.NDArray[Any]]:
-    """The arrays that make up the map itself, its trace apart."""
+    """The arrays that make up a map, without its trace."""
     if isinstance(result, Parameterization):
         return {"uv": result.uv, "corners": result.corners}
     return {"uv": result.uv}
 
 
 def trace_arrays(trace: tuple[TracePoint, ...]) -> dict[str, npt.NDArray[Any]]:
-    """A trace as arrays: absent values are NaN, the map of point n is `trace_uv_<n>`."""
+    """A trace as arrays. A value that a point lacks is NaN; the map of point n is `trace_uv_n`."""
     if not trace:
         return {}
     steps, seconds, terms, maps = zip(*trace, strict=True)
@@ -94,8 +97,8 @@ def _trace(arrays: Arrays) -> tuple[TracePoint, ...]:
 
 
 def write_arrays(path: Path, arrays: Arrays) -> None:
-    """Write `arrays` to the npz file `path`, all or nothing, and onto the disk."""
-    # Indices are most of a map's size, and 32 bits hold them: half the bytes to compress.
+    """Write `arrays` to the npz file `path`: all of it or nothing, and onto the disk."""
+    # Indices take up most of a map. 32 bits hold them, which leaves half the bytes to compress.
     small = {
         name: array.astype(np.int32)
         if array.dtype == np.int64 and array.size and abs(array).max() < 2**31
@@ -113,7 +116,7 @@ def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
         InputError: the file is missing or damaged.
     """
     try:
-        # Opened here: numpy leaves the file open where it is no archive.
+        # We open the file ourselves, since numpy leaves one open that is not an archive.
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
     except FileNotFoundError:
@@ -128,7 +131,7 @@ def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[typing.IO[bytes]]:
-    """A stream whose content becomes the file `path`, in one step, when the block ends well."""
+    """A stream whose content becomes the file `path` in one step, if the block raises nothing."""
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
@@ -143,7 +146,7 @@ def replacing(path: Path) -> Iterator[typing.IO[bytes]]:
 
 
 def sync_folder(folder: Path) -> None:
-    """Put the names in `folder` onto the disk, where the system can."""
+    """Put the names of the files in `folder` onto the disk, if the system can do so."""
     with contextlib.suppress(OSError, AttributeError):
         handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
         try:
@@ -154,7 +157,11 @@ def sync_folder(folder: Path) -> None:
 
 @contextlib.contextmanager
 def disk_said(path: Path) -> Iterator[None]:
-    """Says a full disk, or a limit on files that is reached, in one clear line."""
+    """Turn a full disk, or a limit on the size of files, into one clear line.
+
+    Raises:
+        InputError: the disk is full, or the limit is reached.
+    """
     try:
         yield
     except OSError as error:

@@ -5,6 +5,9 @@ triangles of the 3D Delaunay complex those with small empty balls are candidates
 them one by one, the smoothest and smallest first. It only closes up on itself once nothing else is
 left to take, which keeps noise from growing handles.
 
+What is small is said in spacings: the distance to the nearest points, or to the next line where
+points are scanned in lines (`parapoint.surfaces.scan_lines`).
+
 Where two sheets are nearer to each other than their points are, no front tells them apart. One more
 front therefore takes only the triangles between inside and outside (`parapoint.computed.delaunay`),
 as they face. Open sheets have no inside.
@@ -27,7 +30,10 @@ from scipy.spatial import QhullError, cKDTree
 
 from parapoint.computed.delaunay import delaunay_complex, empty_radii, insideness
 from parapoint.computed.sheets import sheet_normals, sheet_triangles
+from parapoint.errors import InputError
+from parapoint.surfaces.scan_lines import NEAREST, breadth
 from parapoint.surfaces.surface import (
+    BoolArray,
     FloatArray,
     IntArray,
     Mesh,
@@ -52,6 +58,10 @@ AGAINST = -0.3
 """Least cosine between a triangle along the sheets and any of the three normals at its corners."""
 DISAGREEMENT = 2.0
 """Such a triangle counts as larger by so many times 1 − its mean cosine with them."""
+LONELY_LINES = 0.5
+"""Share of points that see no line beside their own at which there is no surface to be found."""
+THINNEST = 1e-7
+"""Least height of a triangle over its longest edge."""
 QUARTER = math.pi / 2
 SHARP = math.pi / 3
 """A turn from one sheet that crosses another to that one is at least so sharp, in radians."""
@@ -75,14 +85,15 @@ def triangulation(points: FloatArray) -> Mesh:
 
     Raises:
         ReconstructionError: there are no candidate triangles.
+        InputError: the points lie on lines too far apart.
     """
-    spacing = cKDTree(points).query(points, 7)[0][:, 1:].mean(axis=1)
+    spacing = _spacing(points)
     try:
         delaunay = delaunay_complex(points, spacing)
     except QhullError as error:
         raise ReconstructionError(f"Qhull: {str(error).splitlines()[0]}") from None
     triangles, radius = delaunay.triangles, empty_radii(delaunay)
-    near = radius < LOOSEST * spacing[triangles].max(axis=1)
+    near = (radius < LOOSEST * spacing[triangles].max(axis=1)) & _has_area(points, triangles)
     if not near.any():
         raise ReconstructionError("no two neighbouring points span a triangle with a third")
     front, back = (insideness(delaunay) > 0)[delaunay.sides].T
@@ -102,6 +113,36 @@ def triangulation(points: FloatArray) -> Mesh:
     along = _along_sheets(points, normals, triangles[near], radius[near])
     across = _largest_part(points, _Front(points, *along, BEND_COSTS[0], is_oriented=True).grown())
     return across if roughness(across) < SMOOTHER * roughness(best) else best
+
+
+def _spacing(points: FloatArray) -> FloatArray:
+    """(N,) about how far apart points are; where they are on scan lines, how far these are apart.
+
+    Raises:
+        InputError: most points see no second line; no training would see more.
+    """
+    tree = cKDTree(points)
+    spacing: FloatArray = tree.query(points, NEAREST + 1)[0][:, 1:].mean(axis=1)
+    count = breadth(points)
+    if count is None:
+        return spacing
+    if (count == 0).mean() > LONELY_LINES:
+        raise InputError(
+            "the points lie on lines that are more than 50 times as far apart as the points on "
+            "them; keep every tenth point of each line, or scan more lines"
+        )
+    lines = np.flatnonzero(count > NEAREST)
+    for rank in np.unique(count[lines]):
+        rows = lines[count[lines] == rank]
+        spacing[rows] = tree.query(points[rows], [rank + 1])[0][:, 0]
+    return spacing
+
+
+def _has_area(points: FloatArray, triangles: IntArray) -> BoolArray:
+    """(T,) whether the corners of triangles (T, 3) are off a line, up to rounding."""
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    longest = np.max([((p - q) ** 2).sum(axis=1) for p, q in ((a, b), (b, c), (c, a))], axis=0)
+    return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) > THINNEST * longest)
 
 
 def _along_sheets(

@@ -58,6 +58,10 @@ FORMATS: dict[str, Callable[[bytes, Path], Content]] = {
 
 UV_FORMATS = (".obj", ".ply", ".glb", ".gltf", ".npz")
 
+SMALLEST_MESH, LARGEST_MESH = 1e-70, 1e70
+"""Sizes between which a mesh is read, in its own unit: areas and their squares are float64 numbers.
+Clouds have no such bounds."""
+
 logger = logging.getLogger("parapoint")
 
 
@@ -222,6 +226,12 @@ def _mesh(content: Content) -> tuple[Mesh, IntArray]:
         face = int(np.flatnonzero(small)[0])
         raise InputError(f"face {face} has {int(content.sizes[face])} corners; it needs three")
     vertices = read_only(content.vertices, np.float64, "vertices", 3)
+    size = float(np.ptp(vertices / 2, axis=0).max(initial=0)) * 2
+    if size and not SMALLEST_MESH < size < LARGEST_MESH:
+        raise InputError(
+            f"its size is {size:g}, and areas of it are beyond a float64: scale it to between "
+            f"{SMALLEST_MESH:g} and {LARGEST_MESH:g}"
+        )
     outside = (content.corners < 0) | (content.corners >= len(vertices))
     if outside.any():
         corner = int(np.flatnonzero(outside)[0])

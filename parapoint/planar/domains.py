@@ -14,6 +14,9 @@ from parapoint.method import UnsupportedError
 from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, Surface, flat_faces
 
+ROUNDING = 1e-6
+"""Squared distances that differ by no more than this share count as the same."""
+
 
 class FlatteningError(RuntimeError):
     """A method ran on a surface it supports and found no map; the message says why."""
@@ -103,9 +106,17 @@ def circle(points: FloatArray) -> FloatArray:
 
 
 def far_pair(points: FloatArray) -> tuple[int, int]:
-    """Two far points of (B, 3): the farthest from their mean, and the farthest from that."""
-    one = int(((points - points.mean(axis=0)) ** 2).sum(axis=1).argmax())
-    return one, int(((points - points[one]) ** 2).sum(axis=1).argmax())
+    """Two far points of (B, 3): the farthest from their mean, and the farthest from that.
+
+    Of several that are equally far but for rounding, the first.
+    """
+    one = _farthest(points, points.mean(axis=0))
+    return one, _farthest(points, points[one])
+
+
+def _farthest(points: FloatArray, origin: FloatArray) -> int:
+    squared = ((points - origin) ** 2).sum(axis=1)
+    return int((squared >= (1 - ROUNDING) * squared.max()).argmax())
 
 
 def finite(uv: FloatArray) -> FloatArray:

@@ -7,6 +7,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
+from parapoint.surfaces.scan_lines import breadth
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, PointCloud, Surface
 
 NEIGHBOURS = 8
@@ -22,7 +23,7 @@ def components(surface: Surface) -> list[Surface]:
     """The components of a surface, largest first (a mesh's by area, a cloud's by points).
 
     Of a mesh: faces that share vertices, left out where they have no area. Of a cloud: connected
-    components of the graph that joins each point to its NEIGHBOURS nearest.
+    components of the graph that joins each point to its NEIGHBOURS nearest and the next scan line.
     """
     if isinstance(surface, Mesh):
         label = surface.face_components
@@ -42,7 +43,13 @@ def cloud_labels(points: FloatArray) -> IntArray:
     """(N,) the component, from 0, of each of (N, 3) points; see `components`."""
     size = min(len(points), SAMPLE)
     sample = np.unique(points[np.random.default_rng(0).permutation(len(points))[:size]], axis=0)
-    near = cKDTree(sample).query(sample, min(NEIGHBOURS + 1, len(sample)))[1][:, 1:]
+    tree = cKDTree(sample)
+    near = tree.query(sample, min(NEIGHBOURS + 1, len(sample)))[1][:, 1:]
+    if (count := breadth(sample)) is not None:  # one more link, to the next scan line
+        near = np.column_stack([near, near[:, 0]])
+        for rank in np.unique(count[count > NEIGHBOURS]):
+            on_lines = count == rank
+            near[on_lines, -1] = tree.query(sample[on_lines], [rank + 1])[1][:, 0]
     rows = np.repeat(np.arange(len(sample)), near.shape[1])
     graph = sparse.coo_matrix((np.ones(len(rows), bool), (rows, near.ravel())), [len(sample)] * 2)
     label = csgraph.connected_components(graph, directed=False)[1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Self
 
@@ -36,10 +37,17 @@ class Frame:
 
     @classmethod
     def of(cls, points: FloatArray) -> Self:
-        """The frame of (N, 3) points: their bounding box around the origin, largest norm 1."""
+        """The frame of (N, 3) points: their bounding box around the origin, largest norm 1.
+
+        Raises:
+            InputError: the points are all one, or lie farther apart than a float64 can say.
+        """
         low, high = points.min(axis=0), points.max(axis=0)
-        centre = low + (high - low) / 2
-        return cls(centre, float(np.linalg.norm(points - centre, axis=1).max()))
+        with np.errstate(over="ignore"):
+            centre = low + (high - low) / 2
+            offsets = points - centre
+        unit = power_of_two(offsets)  # so that no square is too large or too small for a float64
+        return cls(centre, float(np.linalg.norm(offsets / unit, axis=1).max() * unit))
 
     def inside(self, points: FloatArray) -> FloatArray:
         """(N, 3) points of the surface → the same points in the frame."""
@@ -48,6 +56,22 @@ class Frame:
     def outside(self, points: FloatArray) -> FloatArray:
         """(N, 3) points in the frame → the same points in the surface's unit and place."""
         return np.asarray(points * self.scale + self.centre)
+
+
+def power_of_two(values: FloatArray) -> float:
+    """The power of two next below the largest magnitude: a division by it rounds nothing.
+
+    Raises:
+        InputError: all values are 0, or one is not finite.
+    """
+    size = float(np.abs(values).max())
+    if not 0 < size < np.inf:
+        raise InputError(
+            "all points are one and the same"
+            if size == 0
+            else "the points lie farther apart than a number can say; scale them down"
+        )
+    return math.ldexp(0.5, math.frexp(size)[1])
 
 
 IDENTITY = Frame(np.zeros(3), 1.0)

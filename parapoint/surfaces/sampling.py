@@ -9,6 +9,7 @@ from scipy import sparse
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from parapoint.errors import InputError
+from parapoint.surfaces.frame import power_of_two
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, Surface, edge_table
 
 logger = logging.getLogger("parapoint")
@@ -46,8 +47,11 @@ def training_points(surface: Surface, count: int, seed: int) -> FloatArray:
     rng = np.random.default_rng(seed)
     if isinstance(surface, Mesh):
         points = surface.vertices[surface.referenced]
-        if len(points) < count and _is_coarse(surface) and surface.face_areas.sum() > 0:
-            points = even_sample(surface, count, seed)
+        if len(points) < count and points.any() and _is_coarse(surface):
+            unit = power_of_two(points)  # in which areas are no larger or smaller than float64
+            scaled = Mesh(surface.vertices / unit, surface.faces)
+            if scaled.face_areas.sum() > 0:
+                points = even_sample(scaled, count, seed) * unit
     else:
         points = surface.points
     if len(points) > 10 * count:
@@ -56,7 +60,8 @@ def training_points(surface: Surface, count: int, seed: int) -> FloatArray:
     distinct = np.unique(points, axis=0)
     if len(distinct) < FEWEST_POINTS:
         raise InputError(f"{len(distinct)} distinct points; a fit needs at least {FEWEST_POINTS}")
-    spread = np.linalg.svd(distinct - distinct.mean(axis=0), compute_uv=False)
+    scaled_points = distinct / power_of_two(distinct)
+    spread = np.linalg.svd(scaled_points - scaled_points.mean(axis=0), compute_uv=False)
     if spread[1] <= 1e-6 * spread[0]:
         raise InputError("all points lie on a line; a fit needs points of a surface")
     if len(distinct) > count:

@@ -21,9 +21,10 @@ import numpy.typing as npt
 from scipy import sparse
 from scipy.sparse import csgraph
 
+from benchmarks.rendering.camera import Camera
+from benchmarks.rendering.colours import Floats
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh, edge_table
-from reports.pictures.render import Camera, Floats
 
 Script = tuple[Mapping[str, object], Mapping[str, npt.NDArray[Any]]]
 """Facts and arrays of a `script`."""

@@ -14,16 +14,33 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from benchmarks.metrics.pointwise import PointMap, point_map
+from benchmarks.rendering.colours import (
+    DARK_TONE,
+    FLIP_ORANGE,
+    LIGHT_TONE,
+    SEAM_GREEN,
+    Floats,
+    Image,
+    averaged,
+    linear,
+)
+from benchmarks.rendering.maps import Map
+from benchmarks.rendering.scene import Scene, View
+from benchmarks.rendering.viewpoints import two_cameras
+from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import PointParameterization
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh, PointCloud
-from reports.pictures import render
-from reports.pictures.render import Floats, Image, Scene, View
 
 SPARSE, DENSE = 10_000, 250_000
-"""Points of the paper's input, and of its texture mapping."""
+"""Points of the paper's input, drawn where a row does not say how many it had, and of its texture
+mapping.
+"""
 
-GREY = render.linear([0.62, 0.62, 0.62])
+MOST_POINTS = 50_000
+"""Most points that are drawn of a cloud: more run into one another."""
+
+GREY = linear([0.62, 0.62, 0.62])
 
 DOT, SEAM_DOT = 0.38, 0.5
 """Radius of a dot in the cloud, and of one on a seam, in mean distances of the sparse points."""
@@ -69,17 +86,24 @@ def surface_points(mesh: Mesh, count: int) -> Points:
     return Points(mesh, np.minimum(face, len(mesh.faces) - 1), weights)
 
 
-def images(
-    view: View, uv: FloatArray, spanning: BoolArray, colours: Floats, squares: float
-) -> Mapping[str, Image]:
-    """The pictures by their kind.
+def points_used(row: ResultRow) -> int:
+    """How many points the method of a row was given."""
+    told = row.report.get("points", row.params.get("points"))
+    return min(told, MOST_POINTS) if isinstance(told, int) and told > 0 else SPARSE
 
-    `uv` (F, 3, 2) at the corners, `spanning` (F,), `colours` (F, 3, 3) by normals, `squares` fields
-    of the checkerboard to a unit of uv.
+
+def images(
+    view: View, found: Map, colours: Floats, squares: float, count: int
+) -> Mapping[str, Image]:
+    """The pictures of a map of a mesh by their kind.
+
+    `colours` (F, 3, 3) of the corners by normals, `squares` fields of the checkerboard to a unit of
+    uv, `count` points of the cloud.
     """
-    mesh = view.scene.mesh
-    sparse, dense = surface_points(mesh, SPARSE), surface_points(mesh, DENSE)
-    spacing = float(np.sqrt(mesh.face_areas.sum() / SPARSE))
+    mesh, spanning = view.scene.mesh, found.spanning
+    uv = found.uv - found.uv.min(axis=(0, 1))
+    sparse, dense = surface_points(mesh, count), surface_points(mesh, DENSE)
+    spacing = float(np.sqrt(mesh.face_areas.sum() / count))
     seen = view.at_corners(mesh.vertices[mesh.faces])
     reach = DOT * spacing
     distance, nearest = cKDTree(sparse.positions).query(
@@ -89,7 +113,8 @@ def images(
     tones = sparse.at(colours).astype(np.float32)
     _, densely = cKDTree(dense.positions).query(seen, workers=-1)
     field = np.floor(dense.uv(uv, spanning) * squares).sum(axis=1) % 2 == 0
-    checker = np.where(field[:, None], render.LIGHT_TONE, render.DARK_TONE)
+    checker = np.where(field[:, None], LIGHT_TONE, DARK_TONE)
+    checker[found.flipped[dense.face]] = FLIP_ORANGE
     return {
         "cloud": _part(view, dots).image(tones[nearest[dots]], lit=False),
         "cloud-uv": _planar(sparse.uv(uv, spanning), tones, view),
@@ -126,7 +151,7 @@ class Portrait:
         self._radius = np.minimum(near[:, 1:].mean(axis=1), 3 * np.median(near[:, 1:]))
         self._fields = fields
         scene = Scene(self._disks(), shadows=False)
-        cameras = render.two_cameras(scene)
+        cameras = two_cameras(scene)
         self._views = [scene.view(camera, size, samples) for camera in cameras]
 
     def _disks(self) -> Mesh:
@@ -170,10 +195,10 @@ class Portrait:
         found = point_map(self.cloud, result)
         view = self._views[0]
         point, dots = self._dots(view)
-        tones = render.linear(0.5 + 0.42 * self._normals @ view.camera.axes.T)
+        tones = linear(0.5 + 0.42 * self._normals @ view.camera.axes.T)
         field = np.floor(found.uv / self._field(found)).sum(axis=1) % 2 == 0
-        checker = np.where(field[:, None], render.LIGHT_TONE, render.DARK_TONE)
-        seam = np.where(found.spanning[:, None], render.SEAM_GREEN, GREY)
+        checker = np.where(field[:, None], LIGHT_TONE, DARK_TONE)
+        seam = np.where(found.spanning[:, None], SEAM_GREEN, GREY)
         kept = dots | found.spanning[point]
         makers: dict[str, Callable[[], Image]] = {
             "cloud": lambda: _part(view, dots).image(tones[point[dots]], lit=False),
@@ -212,7 +237,7 @@ def _seams(view: View, seam: FloatArray, dots: BoolArray, seen: Floats, spacing:
         distance, _ = cKDTree(seam).query(seen, distance_upper_bound=SEAM_DOT * spacing, workers=-1)
         green = np.isfinite(distance)
     kept = dots | green
-    colours = np.where(green[kept, None], render.SEAM_GREEN, GREY)
+    colours = np.where(green[kept, None], SEAM_GREEN, GREY)
     return _part(view, kept).image(colours.astype(np.float32))
 
 
@@ -229,6 +254,6 @@ def _planar(uv: FloatArray, tones: Floats, view: View) -> Image:
     radius = DOT * 1.2 * float(np.sqrt(extent.prod() / len(uv)))
     distance, nearest = cKDTree(uv).query(grid, distance_upper_bound=radius, workers=-1)
     found = np.isfinite(distance)
-    return render.averaged(
+    return averaged(
         (int(height), int(width)), samples, np.flatnonzero(found), tones[nearest[found]]
     )

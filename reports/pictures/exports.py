@@ -12,7 +12,7 @@ import numpy.typing as npt
 import trimesh
 from PIL import Image
 
-from benchmarks.store.results import ResultRow
+from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
 from parapoint.files.mesh_writers import write_obj
 from parapoint.files.targets import complete_file
@@ -21,7 +21,8 @@ from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh
 from parapoint.textures.checkerboard import checkerboard
 from reports.contents import Contents
-from reports.pictures.drawing import known_keys, slug
+from reports.pictures.drawing import known_keys
+from reports.pictures.names import slug
 
 KINDS = ("obj", "glb")
 

@@ -15,19 +15,21 @@ from dataclasses import dataclass
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from PIL import Image as Images
+from PIL import ImageColor
 from pypdf import PdfWriter
 
-from benchmarks.store.results import ResultRow
+from benchmarks.store.rows import ResultRow
 from parapoint.sources import source_hash
 from reports.contents import SHEETS, Contents
-from reports.pictures.clouds import DENSE, SPARSE
-from reports.pictures.drawing import known_keys, slug
+from reports.pictures.clouds import DENSE, SPARSE, points_used
+from reports.pictures.drawing import known_keys
 from reports.pictures.galleries import (
     ablation,
     ablation_of_the_paper,
@@ -36,10 +38,13 @@ from reports.pictures.galleries import (
     disks,
     heat_maps,
     is_cut,
+    leading,
     maps,
     models,
 )
+from reports.pictures.names import slug
 from reports.pictures.plots import (
+    LEAST_SIZES,
     area_convergence,
     convergence,
     cost,
@@ -47,7 +52,7 @@ from reports.pictures.plots import (
     pareto,
     singular_values,
 )
-from reports.pictures.style import STYLE
+from reports.pictures.style import DARK_PAPER, STYLE, darken
 from reports.tables.published import published_values
 
 
@@ -69,6 +74,9 @@ class Drawing:
     rows: tuple[ResultRow, ...]
     figure: Callable[[], Figure | None]
 
+
+ENDINGS = (".pdf", ".png", "-dark.png")
+"""What the files of a figure end in: for print, for light pages, for dark ones."""
 
 JPEG_QUALITY = 85
 """Of pictures in a PDF."""
@@ -150,14 +158,23 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
         *several(
             "clouds",
             "ParaPoint from points",
-            f"The paper's figure. (a) {SPARSE:,} points, as ParaPoint gets them, coloured by the "
-            "true normals, which it does not get. (b) Their uv, in the same colours. (c) The "
-            f"checkerboard on {DENSE:,} points. (d) Green: points of the faces that span a learned "
-            "seam. The uv of a point is interpolated in its face, or is that of the nearest corner "
-            "where the face spans a seam: the results hold no network that could be asked. Of a "
-            f"report of more than {SHEETS} models, those of the paper are shown. Where "
-            "the model is a cloud itself, (c) shows its own points as disks, and (d) those where "
-            "the map tears between neighbours.",
+            f"The paper's figure. (a) Points of the surface, as many as ParaPoint was given "
+            f"({points_told(contents)}), coloured by the true normals, which it was not given. "
+            f"(b) Their uv, in the same colours. (c) The checkerboard on {DENSE:,} points, those "
+            "of flipped faces in orange. (d) Green: points of the faces that span a learned seam. "
+            "The uv of a point is interpolated in its face, or is that of the nearest corner where "
+            "the face spans a seam: the results hold no network that could be asked."
+            + (
+                f" Of more than {SHEETS} models, those of the paper are shown."
+                if not sheets
+                else ""
+            )
+            + (
+                " Where the model is a cloud itself, (c) shows its own points as disks, and (d) "
+                "those where the map tears between neighbours."
+                if contents.clouds
+                else ""
+            ),
             make=partial(clouds, contents, pictures),
             cases=as_points,
             size=ROWS,
@@ -203,8 +220,8 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
             "pareto",
             "Angles against areas",
             "Angle difference (over all faces) against area discrepancy; the grey steps join what "
-            "no other method with one chart beats in both (hollow: many charts). A map may buy the "
-            "one with the other.",
+            "no other method with one chart beats in both. Hollow: many charts; pale: broken or "
+            "collapsed, so not on the steps. A map may buy the one with the other.",
             make=partial(pareto, contents),
             cases=cases,
             size=PANELS,
@@ -251,7 +268,7 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
             "cost",
             "Time against size",
             "Wall time of each method against the number of faces, model by model; the lines are "
-            "the power laws that fit it best.",
+            f"the power laws that fit best, where a method has {LEAST_SIZES} sizes or more.",
             contents.rows,
             partial(cost, contents),
         ),
@@ -282,6 +299,16 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
                 )
             )
     return found
+
+
+def points_told(contents: Contents) -> str:
+    """How many points ParaPoint was given, "2,048" or "500 to 10,000", and in which budget."""
+    label = leading(contents, "parapoint")
+    rows = [row for row in contents.rows if label and contents.labels[row.id] == label]
+    counts = sorted(points_used(row) for row in rows if row.status == "ok") or [SPARSE]
+    told = " to ".join(f"{count:,}" for count in dict.fromkeys([counts[0], counts[-1]]))
+    budget = [part for part in label.detail.split(", ") if "points" not in part] if label else []
+    return "; ".join([told, *([", ".join(budget)] if budget else [])])
 
 
 @dataclass(frozen=True)
@@ -319,8 +346,8 @@ def draw(contents: Contents, pictures: Path, folder: Path, jobs: int) -> list[Dr
             make(drawing)
     record.write_text(json.dumps(keys, indent=0, sort_keys=True) + "\n")
     for name in known.keys() - keys.keys():  # of a folder that grew
-        for kind in ("pdf", "png"):
-            (folder / f"{name}.{kind}").unlink(missing_ok=True)
+        for ending in ENDINGS:
+            (folder / f"{name}{ending}").unlink(missing_ok=True)
     drawn = [
         Drawn(one.name, one.title, one.caption)
         for one in planned
@@ -332,12 +359,12 @@ def draw(contents: Contents, pictures: Path, folder: Path, jobs: int) -> list[Dr
 
 
 def write(folder: Path, coarse: bool, drawing: Drawing) -> None:
-    """Write a figure as PDF and PNG; the same figure gives the same bytes.
+    """Write a figure as PDF, as PNG, and as PNG for dark pages; the same figure, the same bytes.
 
     Sheets of many pictures, and all figures if `coarse`, are not as fine: they are most of the
-    weight. So are colours beyond 256, which no eye misses.
+    weight.
     """
-    files = [folder / f"{drawing.name}.{kind}" for kind in ("pdf", "png")]
+    files = [folder / f"{drawing.name}{ending}" for ending in ENDINGS]
     sheet = coarse or drawing.name.startswith(("maps-", "heat-"))
     with mpl.rc_context(STYLE | {"savefig.dpi": STYLE["savefig.dpi"] * (0.7 if sheet else 1.0)}):
         made = drawing.figure()
@@ -345,21 +372,45 @@ def write(folder: Path, coarse: bool, drawing: Drawing) -> None:
             for file in files:
                 file.unlink(missing_ok=True)
             return
-        content = io.BytesIO()
-        made.savefig(content, format="png")
-        with Images.open(content) as image:
-            whole = image.convert("RGB")
-            colours = whole.quantize(256, method=Images.Quantize.FASTOCTREE)
-            levels = colours.getpalette() or []
-            colours.putpalette([255 if level > 247 else level for level in levels])  # white paper
-            few = whole.quantize(palette=colours, dither=Images.Dither.FLOYDSTEINBERG)
-            few.save(files[1], optimize=True, dpi=image.info["dpi"])
+        document, bright, dark = files
+        few_colours(made, "white", bright)
         pictures = made.findobj(AxesImage)
+        as_shown = [shown.get_array() for shown in pictures]
         for shown in pictures:
             shown.set_interpolation("none")  # as it is, at the size it is printed
+            shown.set_data(on_white(shown.get_array()))
         content = io.BytesIO()
         made.savefig(content, format="pdf", metadata={"CreationDate": None, "Title": drawing.title})
-        files[0].write_bytes(light(content) if pictures else content.getvalue())
+        document.write_bytes(light(content) if pictures else content.getvalue())
+        for shown, picture in zip(pictures, as_shown, strict=True):
+            shown.set_interpolation("antialiased")
+            shown.set_data(picture)
+        darken(made)
+        few_colours(made, DARK_PAPER, dark)
+
+
+def few_colours(made: Figure, paper: str, path: Path) -> None:
+    """Write a figure as PNG of 256 colours, as many as the eye tells apart; `paper` stays exact."""
+    content = io.BytesIO()
+    made.savefig(content, format="png", facecolor=paper)
+    with Images.open(content) as image:
+        whole = image.convert("RGB")
+        colours = whole.quantize(256, method=Images.Quantize.FASTOCTREE)
+        levels = np.reshape(colours.getpalette() or [], (-1, 3))
+        exact = np.array(ImageColor.getrgb(paper))
+        levels[(np.abs(levels - exact) < 8).all(axis=1)] = exact
+        colours.putpalette(levels.reshape(-1).tolist())
+        few = whole.quantize(palette=colours, dither=Images.Dither.FLOYDSTEINBERG)
+        few.save(path, optimize=True, dpi=image.info["dpi"])
+
+
+def on_white(picture: Any) -> Any:
+    """(h, w, 4) of a picture, in bytes, as (h, w, 3) on white; other arrays as they are."""
+    if picture.ndim != 3 or picture.shape[2] != 4:
+        return picture
+    shown = Images.fromarray(np.asarray(picture))
+    white = Images.new("RGBA", shown.size, "white")
+    return np.asarray(Images.alpha_composite(white, shown).convert("RGB"))
 
 
 def light(document: IO[bytes]) -> bytes:

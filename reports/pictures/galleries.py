@@ -10,7 +10,8 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from benchmarks.store.results import ResultRow
+from benchmarks.rendering.maps import ANGLE_SCALE, AREA_SCALE
+from benchmarks.store.rows import ResultRow
 from parapoint.surfaces.preparation import CUT
 from reports.contents import (
     ANGLE,
@@ -20,18 +21,13 @@ from reports.contents import (
     POINT_AREA,
     POINT_COLLISIONS,
     POINT_TEARS,
+    SPANNING,
     Contents,
     Label,
 )
-from reports.pictures.drawing import (
-    ANGLE_SCALE,
-    AREA_SCALE,
-    ARTIST_PICTURES,
-    CLOUD_PICTURES,
-    map_file,
-    model_file,
-)
+from reports.pictures.names import ARTIST_PICTURES, CLOUD_PICTURES, map_file, model_file
 from reports.pictures.style import WIDTH, figure, picture_grid, put, wrapped
+from reports.tables.table import metric_column
 
 
 def leading(contents: Contents, method: str) -> Label | None:
@@ -58,20 +54,21 @@ def values_text(contents: Contents, row: ResultRow) -> str:
     cells = contents.measured[contents.measured["id"] == row.id]
     if cells.empty:
         return ""
-    cell = cells.iloc[0]
-    if row.case in contents.clouds:
-        shares = [f"tears at {100 * cell[POINT_TEARS]:.2g}%"] if cell[POINT_TEARS] > 0 else []
-        if cell[POINT_COLLISIONS] > 0:
-            shares.append(f"collisions {100 * cell[POINT_COLLISIONS]:.2g}%")
-        first = f"stretch {cell[POINT_ANGLE]:.2f}   area {cell[POINT_AREA]:.2f}"
-        return "\n".join([first, *shares])
-    if not np.isfinite(cell[[ANGLE, AREA, FLIPPED]].to_numpy(dtype=float)).all():
+    of_points = row.case in contents.clouds
+    metrics = (POINT_ANGLE, POINT_AREA) if of_points else (ANGLE, AREA)
+    names = ("stretch", "area") if of_points else ("angle", "area")
+    faults = (
+        {"tears": POINT_TEARS, "collisions": POINT_COLLISIONS}
+        if of_points
+        else {"flipped": FLIPPED, "spanning": SPANNING}
+    )
+    values = {name: float(cells.iloc[0][name]) for name in (*metrics, *faults.values())}
+    if not np.isfinite([values[name] for name in metrics]).all():
         return "no finite values"
-    lines = [f"angle {cell[ANGLE]:.3f}   area {cell[AREA]:.2f}"]
-    extra = [f"flipped {100 * cell[FLIPPED]:.2g}%"] if cell[FLIPPED] > 0 else []
-    if cell["spanning_fraction"] > 0:
-        extra.append(f"spanning {100 * cell['spanning_fraction']:.2g}%")
-    return "\n".join([*lines, "   ".join(extra)]) if extra else lines[0]
+    shown = {name: metric_column(name).shown(value) for name, value in values.items()}
+    lines = ["   ".join(f"{name} {shown[of]}" for name, of in zip(names, metrics, strict=True))]
+    extra = [f"{name} {shown[of]} %" for name, of in faults.items() if values[of] > 0]
+    return "\n".join([*lines, *(["   ".join(extra)] if extra else [])])
 
 
 def pictures_of(
@@ -298,7 +295,7 @@ def heat_maps(contents: Contents, case: str, pictures: Path) -> Figure:
     width, height = made.get_size_inches()
     for number, (scale, title, ticks) in enumerate(
         (
-            (ANGLE_SCALE, "stretch $\\sigma_1/\\sigma_2$", ("1", "2", "4 or more")),
+            (ANGLE_SCALE, "stretch σ1/σ2", ("1", "2", "4 or more")),
             (AREA_SCALE, "UV area / 3D area", ("1/8 or less", "1", "8 or more")),
         )
     ):

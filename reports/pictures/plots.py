@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from benchmarks.metrics.distortion import (
@@ -14,12 +15,12 @@ from benchmarks.metrics.distortion import (
     face_distortion,
     triangles,
 )
-from benchmarks.store.results import ResultRow
+from benchmarks.rendering.maps import Map
+from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray
 from reports.contents import ANGLE, AREA, Contents, Label
-from reports.pictures.drawing import Map
 from reports.pictures.galleries import leading
 from reports.pictures.style import (
     COLOURS,
@@ -31,6 +32,21 @@ from reports.pictures.style import (
     wrapped,
 )
 from reports.ranking import may_rank
+
+LEAST_ANGLE, LEAST_AREA = 1e-4, 1e-3
+"""Angle difference in radians, and area discrepancy, below which figures draw all values alike.
+
+Tables print smaller ones as "<0.0001" and "<0.001".
+"""
+LEAST_SIZES = 5
+"""Least number of different sizes through which a power law is drawn."""
+LEAST, MOST = 1e-30, 1e30
+"""Seconds and losses between which values are drawn: nobody measured a number beyond."""
+
+
+def _drawn(values: pd.Series) -> pd.Series:
+    """Which values of a column can be drawn on a logarithmic axis."""
+    return (values > LEAST) & (values < MOST)
 
 
 def losses(contents: Contents, cases: Sequence[str]) -> Figure | None:
@@ -49,8 +65,8 @@ def losses(contents: Contents, cases: Sequence[str]) -> Figure | None:
     names = [name for name in names if name not in {"iteration", "seconds"}]
     for place, (case, found) in zip(places, traces.items(), strict=True):
         for number, name in enumerate(names):
-            if name in found and (found[name] > 0).any():
-                known = found[found[name] > 0]
+            if name in found and (drawn := _drawn(found[name])).any():
+                known = found[drawn]
                 total = name in {"total", "loss"}
                 place.plot(
                     known["iteration"],
@@ -61,6 +77,7 @@ def losses(contents: Contents, cases: Sequence[str]) -> Figure | None:
                     linewidth=1.6 if total else 1.1,
                 )
         place.set_yscale("log")
+        plain_log(place.yaxis)
         place.set_title(case)
         place.set_xlabel("iteration")
     places[0].set_ylabel("loss term")
@@ -91,7 +108,10 @@ def quality_trace(contents: Contents, row: ResultRow) -> pd.DataFrame:
     records = []
     for at in result.trace:
         if at.uv is not None and len(at.uv) == len(result.uv):
-            faces = triangles(surface, Parameterization(at.uv, result.corners))
+            try:
+                faces = triangles(surface, Parameterization(at.uv, result.corners))
+            except InputError:  # a state on the way that no number can measure
+                continue
             found = face_distortion(faces)
             records.append(
                 {
@@ -128,7 +148,8 @@ def _convergence(
             if len(found) < 2:
                 value = contents.measured.loc[contents.measured["id"] == row.id, metric]
                 found = pd.DataFrame({"seconds": [row.seconds], name: [float(value.iloc[0])]})
-            known = found[np.isfinite(found[name]) & (found["seconds"] > 0)]
+            known = found[np.isfinite(found[name]) & _drawn(found["seconds"])].copy()
+            known[name] = known[name].clip(lower=LEAST_ANGLE if name == "angle" else None)
             if len(known):  # a map of points has neither angles nor areas of faces
                 curves.setdefault(case, []).append((label, known))
     if not traced:
@@ -141,53 +162,81 @@ def _convergence(
                 **look(contents, label),
             )  # fmt: skip
         place.set_xscale("log")
-        plain_log(place.xaxis)
         if name == "angle":
             place.set_yscale("log")
-            plain_log(place.yaxis)
         place.set_title(case)
         place.set_xlabel("seconds")
     places[0].set_ylabel(title)
+    share_limits(places)
     legend_below(made, places)
     return made
 
 
 def pareto(contents: Contents, cases: Sequence[str]) -> Figure | None:
     """Angle against area distortion, model by model: nearer to the lower left is better."""
-    good = contents.means[contents.means["ok"] > 0]
-    good = good[np.isfinite(good[ANGLE]) & np.isfinite(good[AREA])]
-    cases = [case for case in cases if (good["case"] == case).any()]
-    if not cases:
+    shown = {case: points for case in cases if len(points := trade_offs(contents, case))}
+    if not shown:
         return None
-    made, places = small_multiples(len(cases))
-    for place, case in zip(places, cases, strict=True):
-        own = good[good["case"] == case].set_index("label")
+    made, places = small_multiples(len(shown))
+    for place, (case, points) in zip(places, shown.items(), strict=True):
+        place.set_yscale("log")
         for label in contents.methods:
-            if label.short in own.index:
-                record = own.loc[label.short]
+            if label.short in points.index:
                 style = look(contents, label) | {"linestyle": "none"}
                 style["markersize"] = 10 if style["marker"] == "*" else 6.5
                 if label.short in contents.atlases:
                     style |= {"markerfacecolor": "none", "markeredgecolor": style["color"]}
                 else:
                     style |= {"markeredgecolor": "white", "markeredgewidth": 0.5}
-                at = [max(float(record[AREA]), 1e-4)], [max(float(record[ANGLE]), 1e-6)]
-                place.plot(*at, label=label.short, **style)
-        own = own[~own.index.isin(contents.atlases)]
-        own = own[[may_rank(found, angles=False) for found in own["grade"]]]
-        points = own[[AREA, ANGLE]].clip(lower=[1e-4, 1e-6]).sort_values(AREA).to_numpy(dtype=float)
-        if len(points):
-            best = np.minimum.accumulate(points[:, 1])
-            place.step(points[:, 0], best, where="post", color="0.6", linewidth=0.8, zorder=1)
-        place.set_yscale("log")
-        plain_log(place.yaxis)
-        right = place.get_xlim()[1]
-        place.set_xlim(-0.04 * right, 1.04 * right)  # no marker is cut at either end
+                if not points.loc[label.short, "fit"]:
+                    style["alpha"] = 0.35
+                at = points.loc[label.short, [AREA, ANGLE]]
+                place.plot(at.iloc[0], at.iloc[1], label=label.short, clip_on=False, **style)
+        front = pareto_front(contents, points)
+        place.step(front[:, 0], front[:, 1], where="post", color="0.6", linewidth=0.8, zorder=1)
         place.set_title(case)
         place.set_xlabel("area discrepancy")
     places[0].set_ylabel("angle difference [rad]")
+    share_limits(places)
+    for place in places:
+        right = place.get_xlim()[1]
+        place.set_xlim(-0.04 * right, right)  # no marker is cut at the left end
     legend_below(made, places)
     return made
+
+
+def trade_offs(contents: Contents, case: str) -> pd.DataFrame:
+    """Area and angle distortion of the maps of a model, and whether each is `fit` to be ranked.
+
+    By the methods' short names; values below LEAST_AREA and LEAST_ANGLE are raised to them.
+    """
+    own = contents.means[(contents.means["case"] == case) & (contents.means["ok"] > 0)]
+    own = own[np.isfinite(own[ANGLE]) & np.isfinite(own[AREA])].set_index("label")
+    points: pd.DataFrame = own[[AREA, ANGLE]].clip(lower=[LEAST_AREA, LEAST_ANGLE], axis=1)
+    points["fit"] = [may_rank(found, angles=False) for found in own["grade"]]
+    return points
+
+
+def pareto_front(contents: Contents, points: pd.DataFrame) -> FloatArray:
+    """(n, 2) area and angle of the `trade_offs` that no other one with one chart beats in both.
+
+    Broken and collapsed maps take no part. By rising area; of one area there is one point.
+    """
+    rivals = points[points["fit"] & ~points.index.isin(contents.atlases)]
+    values = rivals.sort_values([AREA, ANGLE])[[AREA, ANGLE]].to_numpy(dtype=np.float64)
+    before = np.concatenate([[np.inf], np.minimum.accumulate(values[:, 1])[:-1]])[: len(values)]
+    return np.asarray(values[values[:, 1] < before])
+
+
+def share_limits(places: Sequence[Axes]) -> None:
+    """Let all panels of a figure end where the widest does, so that they can be compared."""
+    for name in ("x", "y"):
+        limits = np.array([getattr(place, f"get_{name}lim")() for place in places])
+        for place in places:
+            getattr(place, f"set_{name}lim")(limits[:, 0].min(), limits[:, 1].max())
+            axis = getattr(place, f"{name}axis")
+            if axis.get_scale() == "log":
+                plain_log(axis)
 
 
 def singular_values(contents: Contents, cases: Sequence[str]) -> Figure | None:
@@ -223,7 +272,7 @@ def singular_values(contents: Contents, cases: Sequence[str]) -> Figure | None:
         place.grid(visible=False, axis="y")
         place.tick_params(axis="y", length=0)
         place.set_title(case)
-        place.set_xlabel(r"$\sigma_1$ (filled), $\sigma_2$ (line)")
+        place.set_xlabel("σ1 (filled), σ2 (line)")
     return made
 
 
@@ -245,7 +294,7 @@ def singular_value_shares(
 
 
 def cost(contents: Contents) -> Figure | None:
-    """Time against the number of faces for every method, and the power law that fits it."""
+    """Time against the number of faces for every method, with its power law if it has enough."""
     surfaces = {case: contents.mesh(case) for case in contents.cases}
     sizes = {case: len(mesh.faces) for case, mesh in surfaces.items() if mesh is not None}
     if len(set(sizes.values())) < 2:
@@ -254,17 +303,22 @@ def cost(contents: Contents) -> Figure | None:
     place = places[0]
     for label in contents.methods:
         rows = [contents.shown(case, label) for case in sizes]
-        points = [(sizes[row.case], row.seconds) for row in rows if row and row.seconds]
+        points = [
+            (sizes[row.case], row.seconds)
+            for row in rows
+            if row and row.seconds and LEAST < row.seconds < MOST
+        ]
         if not points:
             continue
         style = look(contents, label)
         faces, seconds = np.array(points, dtype=np.float64).T
-        place.plot(faces, seconds, markersize=3.5, alpha=0.5, **(style | {"linestyle": "none"}))
+        dots = style | {"linestyle": "none"}
+        place.plot(faces, seconds, label=label.short, markersize=3.5, alpha=0.7, **dots)
         ends = np.array([faces.min(), faces.max()])
-        # With two sizes or fewer there is nothing to fit: the line joins them.
-        power = np.polyfit(np.log(faces), np.log(seconds), min(1, len(np.unique(faces)) - 1))
-        line = np.exp(np.polyval(power, np.log(ends)))
-        place.plot(ends, line, label=label.short, markersize=4, markevery=[], **style)
+        if len(np.unique(faces)) < LEAST_SIZES:
+            continue
+        line = np.exp(np.polyval(np.polyfit(np.log(faces), np.log(seconds), 1), np.log(ends)))
+        place.plot(ends, line, markersize=4, markevery=[], **style)
     place.set_xscale("log")
     place.set_yscale("log")
     plain_log(place.xaxis)

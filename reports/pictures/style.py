@@ -8,10 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgba_array
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from PIL import Image as Images
 
@@ -19,7 +23,7 @@ from reports.contents import Contents, Label
 
 STYLE: dict[Any, Any] = {
     "font.family": "STIXGeneral",
-    "mathtext.fontset": "stix",
+    "text.parse_math": False,
     "font.size": 8.5,
     "axes.titlesize": 9,
     "axes.labelsize": 8.5,
@@ -39,7 +43,14 @@ STYLE: dict[Any, Any] = {
     "savefig.dpi": 220,
     "svg.hashsalt": "parapoint",
 }
-"""The fonts come with matplotlib; the text width of a paper is `WIDTH`."""
+"""The fonts come with matplotlib, and no name with dollars is read as a formula. The text width of
+a paper is `WIDTH`."""
+
+DARK_PAPER, DARK_INK = "#1d2025", "#e7e5df"
+"""Background and text of a figure on a dark page: --card and --ink of its style sheet."""
+
+GREY_SPREAD = 0.05
+"""Largest difference of red, green and blue, from 0 to 1, of what counts as grey."""
 
 WIDTH = 7.0
 """Width of a figure, inches."""
@@ -79,7 +90,7 @@ def figure(width: float, height: float) -> Figure:
 
 
 def put(place: Axes, picture: Path | str) -> None:
-    """Show a picture on white at `place`, at the size it is printed; other text as a note."""
+    """Show a picture at `place`, at the size it is printed; other text as a note."""
     place.set_axis_off()
     if isinstance(picture, str):
         note(place, picture)
@@ -90,10 +101,32 @@ def put(place: Axes, picture: Path | str) -> None:
             scale = mpl.rcParams["savefig.dpi"] / mpl.rcParams["figure.dpi"]
             shown = image.convert("RGBA")
             shown.thumbnail((round(box.width * scale), round(box.height * scale)))
-            white = Images.new("RGBA", shown.size, "white")
-            place.imshow(Images.alpha_composite(white, shown).convert("RGB"))
+            place.imshow(shown)
     except OSError:
         note(place, "no picture")
+
+
+def darken(made: Figure) -> None:
+    """Turn a figure into one for a dark page: greys are turned over, colours stay."""
+    made.set_facecolor(DARK_PAPER)
+    for artist in made.findobj(lambda one: one is not made.patch and not isinstance(one, Axes)):
+        for part in ("color", "facecolor", "edgecolor", "markerfacecolor", "markeredgecolor"):
+            if part == "color" and not isinstance(artist, Text | Line2D):
+                continue  # of other artists it is both of the next two
+            found = getattr(artist, f"get_{part}", None)
+            if found is not None:
+                getattr(artist, f"set_{part}")(_turned(found()))
+
+
+def _turned(colour: Any) -> Any:
+    """A colour, or (n, 4) of them, with greys between black and white turned over."""
+    if isinstance(colour, str) and colour in {"none", "auto"}:
+        return colour
+    colours = to_rgba_array(colour)
+    grey = np.ptp(colours[:, :3], axis=1) < GREY_SPREAD
+    paper, ink = to_rgba_array(DARK_PAPER)[0, :3], to_rgba_array(DARK_INK)[0, :3]
+    colours[grey, :3] = ink + (paper - ink) * colours[grey, :1]
+    return colours if len(colours) != 1 else tuple(colours[0])
 
 
 def note(place: Axes, text: str) -> None:
@@ -181,12 +214,11 @@ def plain_log(axis: Axis) -> None:
 
 
 def _plain(value: float) -> str:
-    """A number, as a power of ten below 0.0001."""
+    """A number, with an exponent below 0.0001."""
     if value >= 1e-4:
         return f"{value:,g}"
     mantissa, exponent = f"{value:.0e}".split("e")
-    factor = "" if mantissa == "1" else rf"{mantissa} \cdot "
-    return f"${factor}10^{{{int(exponent)}}}$"
+    return f"{mantissa}e{int(exponent)}"
 
 
 def legend_below(made: Figure, places: Sequence[Axes]) -> None:
@@ -200,6 +232,8 @@ def legend_below(made: Figure, places: Sequence[Axes]) -> None:
             list(found.values()), list(found), loc="lower center", ncols=columns,
             columnspacing=1.4, handlelength=2.6,
         )  # fmt: skip
+        for shown in filter(None, legend.legend_handles):
+            shown.set_alpha(1)  # a marker may be pale in the first panel that has it
         if columns == 1 or legend.get_window_extent().width < made.bbox.width:
             break
         legend.remove()

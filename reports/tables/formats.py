@@ -5,11 +5,11 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
-from reports.tables.table import Cell, Table, grouped
+from reports.tables.table import Cell, Column, Table, Value, grouped
 
 PAGE = 45
 """Rows of a LaTeX table on one page."""
@@ -57,13 +57,17 @@ _LATEX = {
 }
 
 
+_SUPERSCRIPTS = "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"
+_LOWERED = str.maketrans(_SUPERSCRIPTS, "-0123456789")
+
+
 def latex_text(text: str) -> str:
     """`text` with every character that LaTeX reads otherwise escaped; others outside ASCII as ?."""
     text = " ".join(text.split())
-    pieces = re.split(r"(·10\^−?\d+)", text)
+    pieces = re.split(rf"(·10[{_SUPERSCRIPTS}]+)", text)
     return "".join(
-        rf"$\cdot 10^{{{piece[4:].replace('−', '-')}}}$"
-        if re.fullmatch(r"·10\^−?\d+", piece)
+        rf"$\cdot 10^{{{piece[3:].translate(_LOWERED)}}}$"
+        if piece.startswith("·10") and len(piece) > 3
         else "".join(_LATEX.get(c, c if c.isascii() and c.isprintable() else "?") for c in piece)
         for piece in pieces
     )
@@ -140,7 +144,7 @@ def markdown(table: Table) -> str:
     """The table as Markdown; best in bold, second in italics."""
 
     def escaped(text: str) -> str:
-        return re.sub(r"([\\`*_{}\[\]<>|#])", r"\\\1", " ".join(text.split()))
+        return re.sub(r"([\\`*_{}\[\]<>|#$~&])", r"\\\1", " ".join(text.split()))
 
     heads = [
         f"{column.group}: {column.head}" if column.group else column.head
@@ -171,18 +175,31 @@ def comma_separated(table: Table) -> str:
     """The table as CSV: keys as heads, numbers in full, every row complete."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([column.key for column in table.columns])
+    writer.writerow([_plain(column.key) for column in table.columns])
     for block in table.blocks:
         for row in block:
-            values = [row.get(column.key) for column in table.columns]
-            writer.writerow(["" if value is None else value for value in values])
+            writer.writerow([_plain(_full(row, column)) for column in table.columns])
     return out.getvalue()
+
+
+def _plain(value: Value) -> Value:
+    """A value that no spreadsheet computes: text that begins as a formula does gets a quote."""
+    if isinstance(value, str) and value.lstrip().startswith(("=", "+", "-", "@")):
+        return f"'{value}"
+    return "" if value is None else value
+
+
+def _full(row: Mapping[str, Value], column: Column) -> Value:
+    """A value in full: a fraction as such, or as per cent where the row's own words say so."""
+    value = row.get(column.key)
+    percent = column.by_row and column.of(row).percent
+    return 100 * value if percent and isinstance(value, int | float) else value
 
 
 _CSS = """
 :root { color-scheme: light dark }
-body { font: 16px/1.45 Charter, Palatino, Georgia, serif; margin: 2rem auto; max-width: 84rem;
-  padding: 0 1.5rem }
+body { font: 15px/1.5 system-ui, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif;
+  margin: 2rem auto; max-width: 84rem; padding: 0 1.5rem }
 .scroll { overflow-x: auto }
 table { border-collapse: collapse; border-block: 1.5px solid; font-variant-numeric: tabular-nums }
 tbody { border-top: 1px solid }

@@ -1,18 +1,18 @@
-"""What the page says at first sight: who is best at what, on what; and the cells behind it."""
+"""Who is best at what, on what: what the page says at first sight."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from benchmarks.metrics.table import GROUPS, METRICS
+from benchmarks.metrics.table import METRICS
 from reports.contents import (
     ANGLE,
     AREA,
+    BIJECTIVE,
     FLIPPED,
     ISOMETRIC,
     POINT_ANGLE,
@@ -21,17 +21,16 @@ from reports.contents import (
     POINT_TEARS,
     SPANNING,
     Contents,
-    Label,
 )
-from reports.pictures.drawing import slug
-from reports.ranking import is_of_angles, may_rank
+from reports.pictures.names import slug
+from reports.ranking import TIMES, may_rank, ranks
 from reports.tables.table import metric_column
 
 MEASURES = {
     "Angles": ANGLE,
     "Areas": AREA,
     "Angles and areas": ISOMETRIC,
-    "One to one": "bijective",
+    "One to one": BIJECTIVE,
     "Angles at points": POINT_ANGLE,
     "Areas at points": POINT_AREA,
     "Speed": "seconds",
@@ -41,7 +40,7 @@ MEASURES = {
 SHOWN = (
     *(ANGLE, AREA, ISOMETRIC, FLIPPED, "overlapped_fraction", SPANNING),
     *(POINT_ANGLE, POINT_AREA, POINT_COLLISIONS, POINT_TEARS),
-    "seconds",
+    *TIMES,
 )
 """The metrics that the leaderboard shows before any is chosen."""
 
@@ -62,22 +61,22 @@ class Winner:
 def winner(contents: Contents, case: str, metric: str) -> Winner | None:
     """The best value of `metric` on a model among the methods with one chart; None without any.
 
-    Maps whose grade is too low for that (`reports.ranking`) take no part. Equal is what is equal
-    to three digits.
+    Maps whose grade is too low for that (`reports.ranking`) take no part. Equals win together.
     """
     column = metric_column(metric)
-    values = {
+    fit = {
         str(record["label"]): float(record[metric])
         for record in _by_case(contents).get(case, ())
-        if math.isfinite(record[metric]) and may_rank(record["grade"], angles=is_of_angles(metric))
+        if math.isfinite(record[metric]) and may_rank(record["grade"], angles=column.angles)
     }
-    if not values or (metric == "bijective" and max(values.values()) < 1):
+    if not fit or (metric == BIJECTIVE and max(fit.values()) < 1):
         return None
-    best = (max if column.better == "higher" else min)(values.values())
-    names = tuple(name for name, value in values.items() if f"{value:.2e}" == f"{best:.2e}")
-    if metric == "bijective":
+    texts = [column.shown(value) for value in fit.values()]
+    places = ranks([*fit.values()], texts, column.better, column.tie)
+    names = tuple(name for name, place in zip(fit, places, strict=True) if place == 1)
+    if metric == BIJECTIVE:
         return Winner(names, "")
-    return Winner(names, column.shown(best) + (" s" if metric == "seconds" else ""))
+    return Winner(names, min(zip(places, texts, strict=True))[1] + " s" * (metric in TIMES))
 
 
 @cache
@@ -139,8 +138,8 @@ def page_of(contents: Contents, case: str) -> str:
 
 def definition(name: str) -> str:
     """What a metric is and where it comes from; "" for other columns."""
-    if name == "seconds":
-        return "wall time of the parameterization alone, in seconds"
+    if name in TIMES:
+        return TIME_DEFINITIONS[name]
     metric = METRICS.get(name)
     if metric is None:
         return ""
@@ -151,62 +150,10 @@ def definition(name: str) -> str:
     )
 
 
-def data(suites: Sequence[Contents]) -> dict[str, object]:
-    """All cells with all metrics, as the leaderboard of the page reads them."""
-    names = [
-        name
-        for name in (*METRICS, "seconds")
-        if name == "seconds" or any(name in contents.metrics for contents in suites)
-    ]
-    return {
-        "metrics": [_about(name) for name in names],
-        "shown": [name for name in SHOWN if name in names],
-        "suites": [_suite(contents, names) for contents in suites],
-    }
-
-
-def _about(name: str) -> dict[str, object]:
-    column = metric_column(name)
-    return {
-        "name": name,
-        "title": column.title,
-        "group": "cost" if name == "seconds" else GROUPS[METRICS[name].group],
-        "better": column.better or "lower",
-        "digits": column.digits,
-        "percent": column.percent,
-        "angles": column.angles,
-        "definition": definition(name),
-    }
-
-
-def _suite(contents: Contents, names: Sequence[str]) -> dict[str, object]:
-    by_id = contents.measured.set_index("id").to_dict("index")
-    return {
-        "name": contents.suite,
-        "methods": [_method(contents, label) for label in contents.methods],
-        "models": [{"name": case, "page": page_of(contents, case)} for case in contents.cases],
-        "cells": [
-            {
-                "model": contents.cases.index(row.case),
-                "method": contents.methods.index(contents.labels[row.id]),
-                "seed": row.seed,
-                "status": row.status.replace("_", " "),
-                "reason": row.reason,
-                "grade": by_id[row.id]["grade"] or "",
-                "values": [_number(by_id[row.id], name) for name in names],
-            }
-            for row in contents.rows
-        ],
-    }
-
-
-def _method(contents: Contents, label: Label) -> dict[str, object]:
-    return {"name": label.short, "detail": label.detail, "atlas": label.short in contents.atlases}
-
-
-def _number(values: Mapping[object, object], name: str) -> float | str | None:
-    """A value as JSON can hold it, to five digits."""
-    value = values.get(name)
-    if not isinstance(value, int | float) or math.isnan(value):
-        return None
-    return float(f"{value:.5g}") if math.isfinite(value) else str(value)
+TIME_DEFINITIONS = {
+    "seconds": "wall time of the parameterization alone, in seconds",
+    "cpu_seconds": (
+        "processor time of the parameterization alone, over all threads, in seconds; other "
+        "programs on the machine hardly change it"
+    ),
+}

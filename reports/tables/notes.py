@@ -9,7 +9,7 @@ from reports.contents import Contents
 
 def environment_note(contents: Contents) -> str:
     """Where the numbers come from: machine, commit, versions, seeds."""
-    runs = contents.store.environment()["runs"]
+    runs = contents.runs
     used = {row.run for row in contents.rows}
     said = []
     for number, run in enumerate(runs):

@@ -19,21 +19,14 @@ from reports.contents import (
     Contents,
     number,
 )
-from reports.ranking import may_rank
+from reports.means import STATISTICS, common_cases, common_values, own_values, statistic
+from reports.ranking import MOST_LEFT_OUT, may_rank, means_may_rank
+from reports.tables.kinds import means_by_kind, success
 from reports.tables.notes import environment_note, failure_notes, grade_notes, legend, method_notes
 from reports.tables.published import AUTHORS, Verdict, claim_text, published_values, verdicts
-from reports.tables.studies import (
-    ablation,
-    cuts,
-    means_by_kind,
-    paired_tests,
-    seed_variance,
-    success,
-)
+from reports.tables.statistics import paired_tests, seed_variance
 from reports.tables.table import Column, Table, Value, metric_column, metric_title
-
-MOST_LEFT_OUT = 0.1
-"""Share of a method's maps that may be unfit for a rank before its means take no part in ranks."""
+from reports.tables.variants import ablation, cuts
 
 SUMMARY_METRICS = (
     ANGLE,
@@ -65,9 +58,7 @@ def conformality(contents: Contents) -> Table | None:
         return None
     columns = [Column("case", "Model", text=True)]
     columns += [
-        Column(
-            label.short, label.short, better="lower", digits=4, group="Measured here", angles=True
-        )
+        metric_column(ANGLE, label.short, key=label.short, group="Measured here")
         for label in contents.methods
     ]
     authors = [
@@ -222,61 +213,57 @@ def comparison(contents: Contents, names: Sequence[str] = ()) -> Table:
     `names` are the metrics: SUMMARY_METRICS unless given. The common mean is over the models on
     which every method that ever succeeded did, so that nobody gains by failing.
     """
-    means = contents.means
-    good = means[means["ok"] > 0]
-    able = [label for label in contents.methods if (good["label"] == label.short).any()]
-    common = [
-        case
-        for case in contents.cases
-        if all(((good["case"] == case) & (good["label"] == label.short)).any() for label in able)
-    ]
     blocks = []
+    shared: dict[str, int] = {}
     for name in names or SUMMARY_METRICS:
-        if name not in means.columns or not good[name].notna().any():
-            continue
-        rows: list[dict[str, Value]] = []
         column = metric_column(name)
+        common = common_cases(contents, contents.cases, name)
+        rows: list[dict[str, Value]] = []
         for label in contents.methods:
-            own = good[good["label"] == label.short]
-            values = own[name].dropna()
-            shared = own[own["case"].isin(common)][name].dropna()
-            tried = means[means["label"] == label.short]
-            worst = values.max() if column.better != "higher" else values.min()
-            unfit = [not may_rank(found, angles=column.angles) for found in own["grade"]]
+            values = own_values(contents, label, name)
+            records = [contents.records.get((case, label.short)) for case in contents.cases]
+            own = [record for record in records if record is not None]
+            grades = [record["grade"] for record in own if record["ok"]]
             rows.append(
                 {
                     "metric": metric_title(name),
+                    "name": name,
                     "method": label.short,
                     "label": label.short,
-                    **_scaled(column, "mean", values.mean() if len(values) else None),
-                    **_scaled(column, "median", values.median() if len(values) else None),
-                    **_scaled(column, "worst", worst if len(values) else None),
-                    **_scaled(column, "common", shared.mean() if len(shared) else None),
-                    "count": f"{len(values)}/{int((tried['tried'] > 0).sum())}",
-                    "skipped": float((tried["skipped"] > 0).sum()),
-                    "better": column.better,
-                    "angles": str(column.angles or ""),
-                    "grade": "broken" if sum(unfit) > MOST_LEFT_OUT * len(unfit) else "",
-                    "invalid": float(sum(unfit)),
+                    **{key: statistic(key, values, column.better) for key in STATISTICS},
+                    "common": statistic(
+                        "mean", common_values(contents, label, name, common), column.better
+                    ),
+                    "count": f"{len(values)}/{sum(record['tried'] > 0 for record in own)}",
+                    "skipped": float(sum(record["skipped"] > 0 for record in own)),
+                    "grade": "" if means_may_rank(grades, angles=column.angles) else "broken",
+                    "invalid": float(
+                        sum(not may_rank(one, angles=column.angles) for one in grades)
+                    ),
                 }
             )
-        blocks.append(tuple(rows))
+        if any(row["mean"] is not None for row in rows):
+            blocks.append(tuple(rows))
+            shared[column.title] = len(common)
+    common = common_cases(contents, contents.cases)
     shown = f"{len(common)}: {', '.join(common)}" if 0 < len(common) <= 12 else str(len(common))
+    fewer = [f"{title} on {count}" for title, count in shared.items() if count != len(common)]
     return Table(
         name="comparison",
         title="All methods over all models",
         caption=(
             "Each metric over the models: mean, median and worst over those on which the method "
             "ended well (their count beside it, of those tried), and the mean over the models on "
-            f"which all methods did ({shown})."
+            f"which all methods did ({shown}). The arrow at a metric points to its better side. "
+            f"A method with more than {MOST_LEFT_OUT:.0%} of its maps not rankable is not ranked."
         ),
         columns=(
             Column("metric", "Metric", text=True, once=True),
             Column("method", "Method", text=True),
-            Column("mean", "mean", better="lower", digits=4),
-            Column("median", "median", better="lower", digits=4),
-            Column("worst", "worst", better="lower", digits=4),
-            Column("common", "common mean", better="lower", digits=4),
+            Column("mean", "mean", by_row=True),
+            Column("median", "median", by_row=True),
+            Column("worst", "worst", by_row=True),
+            Column("common", "common mean", by_row=True),
             Column("count", "ok / tried", text=True),
             Column("invalid", "not rankable", digits=0),
             Column("skipped", "skipped", digits=0),
@@ -284,15 +271,12 @@ def comparison(contents: Contents, names: Sequence[str] = ()) -> Table:
         blocks=tuple(blocks),
         set_apart=contents.atlases,
         notes=(
+            *([f"Not defined on all models: {', '.join(fewer)}."] if fewer else []),
             *method_notes(contents),
             *failure_notes(contents),
             environment_note(contents),
         ),
     )
-
-
-def _scaled(column: Column, key: str, value: float | None) -> dict[str, Value]:
-    return {key: 100 * float(value) if column.percent and value is not None else value}
 
 
 def against_published(contents: Contents) -> Table | None:

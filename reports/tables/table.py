@@ -2,20 +2,45 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from benchmarks.metrics.table import METRICS
-from reports.ranking import is_of_angles, may_rank, ranks
+from reports.contents import (
+    ANGLE,
+    AREA,
+    FLIPPED,
+    ISOMETRIC,
+    OVERLAPPED,
+    POINT_ANGLE,
+    POINT_AREA,
+    POINT_COLLISIONS,
+    POINT_TEARS,
+    SPANNING,
+)
+from reports.numbers import printed
+from reports.ranking import TIMES, Mark, is_of_angles, marks, may_rank, tolerance
 
 Value = float | str | None
-Mark = Literal["", "best", "second"]
 
-MARKS: dict[int | None, Mark] = {1: "best", 2: "second"}
 ARROWS = {"lower": "↓", "higher": "↑"}
+
+SHORT = {
+    ANGLE: "angle [rad]",
+    AREA: "area [0–2]",
+    ISOMETRIC: "sym. Dirichlet",
+    FLIPPED: "flipped %",
+    OVERLAPPED: "overlapped %",
+    SPANNING: "spanning %",
+    POINT_ANGLE: "stretch",
+    POINT_AREA: "area",
+    POINT_COLLISIONS: "collisions %",
+    POINT_TEARS: "tears %",
+    "seam_excess": "seam − artist's",
+}
+"""Heads of metrics in tables that show many of them."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +57,9 @@ class Column:
         group: a head over neighbouring columns with the same group.
         text: whether it holds words, set to the left.
         angles: whether its values read angles alone, so that collapsed maps are ranked in it.
+        tie: relative difference up to which two values are equal (`reports.ranking.tolerance`).
+        by_row: whether each row gives a metric under "name", by which the value is printed and
+            ranked.
     """
 
     key: str
@@ -43,27 +71,25 @@ class Column:
     group: str = ""
     text: bool = False
     angles: bool = False
+    tie: float = 0.0
+    by_row: bool = False
 
     @property
     def head(self) -> str:
-        """Title with the arrow to the better side."""
-        return f"{self.title} {ARROWS[self.better]}" if self.better else self.title
+        """Title, per cent where values are shown so, and the arrow to the better side."""
+        percent = " %" if self.percent and not self.title.endswith("%") else ""
+        arrow = f" {ARROWS[self.better]}" if self.better else ""
+        return f"{self.title}{percent}{arrow}"
 
     def shown(self, value: Value) -> str:
         """`value` as it is printed."""
-        if value is None or isinstance(value, str):
-            return value or ("" if self.text else "–")
-        if math.isnan(value):
-            return "–"
-        if math.isinf(value):
-            return "∞" if value > 0 else "−∞"
-        number = 100 * value if self.percent else value
-        if 0 < abs(number) < 0.5 * 10**-self.digits:
-            return f"<{10**-self.digits:.{self.digits}f}"
-        if abs(number) >= 1e5:
-            mantissa, exponent = f"{number:.1e}".split("e")
-            return f"{mantissa}·10^{int(exponent)}".replace("-", "−")
-        return f"{number:,.{self.digits}f}".replace("-", "−")
+        if isinstance(value, str) or (value is None and self.text):
+            return value or ""
+        return printed(value, self.digits, percent=self.percent)
+
+    def of(self, row: Mapping[str, Value]) -> Column:
+        """The column that says how the value of `row` is printed and ranked: this one, mostly."""
+        return metric_column(str(row["name"]), key=self.key) if self.by_row else self
 
 
 class Cell(NamedTuple):
@@ -104,62 +130,47 @@ class Table:
         return tuple(self._block(block) for block in self.blocks)
 
     def _block(self, block: Sequence[Mapping[str, Value]]) -> tuple[tuple[Cell, ...], ...]:
-        columns = self.columns
-        texts = [[column.shown(row.get(column.key)) for column in columns] for row in block]
-        marks: list[list[Mark]] = [["" for _ in columns] for _ in block]
+        columns = [[column.of(row) for column in self.columns] for row in block]
+        texts = [
+            [column.shown(row.get(column.key)) for column in own]
+            for row, own in zip(block, columns, strict=True)
+        ]
+        found: list[list[Mark]] = [["" for _ in self.columns] for _ in block]
+        rows = [at for at, row in enumerate(block) if row.get("label") not in self.set_apart]
         ranked = [
             at
-            for at, column in enumerate(columns)
-            if column.better and column.key not in self.set_apart
+            for at, column in enumerate(self.columns)
+            if (column.better or column.by_row) and column.key not in self.set_apart
         ]
-        rows = [at for at, row in enumerate(block) if row.get("label") not in self.set_apart]
-        if self.across:
-            groups = [[(r, c) for c in ranked] for r in rows]
-        else:
-            groups = [[(r, c) for r in rows] for c in ranked]
-        for group in groups:
-            _mark(group, block, columns, texts, marks)
+        by_column = [[(r, c) for r in rows] for c in ranked]
+        by_row = [[(r, c) for c in ranked] for r in rows]
+        for places in filter(None, by_row if self.across else by_column):
+            r, c = places[0]
+            given = marks(
+                [_rankable(block[r], columns[r][c]) for r, c in places],
+                [texts[r][c] for r, c in places],
+                columns[r][c].better,
+                columns[r][c].tie,
+            )
+            for (r, c), mark in zip(places, given, strict=True):
+                found[r][c] = mark
         return tuple(
             tuple(
-                Cell(texts[r][c], marks[r][c], row.get(column.key))
-                for c, column in enumerate(columns)
+                Cell(texts[r][c], found[r][c], row.get(column.key))
+                for c, column in enumerate(columns[r])
             )
             for r, row in enumerate(block)
         )
 
 
-def _mark(
-    places: Sequence[tuple[int, int]],
-    block: Sequence[Mapping[str, Value]],
-    columns: Sequence[Column],
-    texts: Sequence[Sequence[str]],
-    marks: list[list[Mark]],
-) -> None:
-    """Mark the best and the second of the values at `places`.
+def _rankable(row: Mapping[str, Value], column: Column) -> float | None:
+    """The value of a row that takes part in the ranking; None where it has none, or may not.
 
-    A row whose values have a direction of their own gives it under "better", its grade under
-    "grade", or column by column under "grade KEY".
+    The grade of the map stands under "grade", or column by column under "grade KEY".
     """
-    values: list[float | None] = []
-    for row, column in places:
-        value, of = block[row].get(columns[column].key), columns[column]
-        grade = block[row].get(f"grade {of.key}", block[row].get("grade"))
-        angles = bool(block[row].get("angles", of.angles))
-        ranked = isinstance(value, int | float) and may_rank(_text(grade), angles=angles)
-        values.append(float(value) if ranked and isinstance(value, int | float) else None)
-    if not places:
-        return
-    better = {str(block[row].get("better", columns[column].better)) for row, column in places}
-    shown = [texts[row][column] for row, column in places]
-    found = ranks(values, shown, better.pop())
-    if len({text for text, rank in zip(shown, found, strict=True) if rank}) < 2:
-        return  # all are alike: nobody is best
-    for (row, column), rank in zip(places, found, strict=True):
-        marks[row][column] = MARKS.get(rank, "")
-
-
-def _text(value: Value) -> str | None:
-    return value if isinstance(value, str) else None
+    value, grade = row.get(column.key), row.get(f"grade {column.key}", row.get("grade"))
+    fit = may_rank(grade if isinstance(grade, str) else None, angles=column.angles)
+    return float(value) if fit and column.better and isinstance(value, int | float) else None
 
 
 def grouped(columns: Sequence[Column]) -> list[tuple[str, int]]:
@@ -173,10 +184,16 @@ def grouped(columns: Sequence[Column]) -> list[tuple[str, int]]:
     return groups
 
 
-def metric_column(name: str, title: str = "", **given: object) -> Column:
-    """The column of a metric; `seconds` counts as one."""
-    if name == "seconds":
-        return Column("seconds", title or "time [s]", better="lower", digits=2)
+TIME_TITLES = {"seconds": "time [s]", "cpu_seconds": "processor time [s]"}
+
+
+def metric_column(name: str, title: str = "", **given: Any) -> Column:
+    """The column of a metric; the times of TIMES count as metrics."""
+    if name in TIMES:
+        column = Column(
+            name, title or TIME_TITLES[name], better="lower", digits=2, tie=tolerance(name)
+        )
+        return replace(column, **given)
     metric = METRICS[name]
     counts = name.endswith("_count") or metric.unit == "faces" or metric.weighting == "count"
     digits = 4 if metric.unit == "radians" else 1 if counts else 3
@@ -187,12 +204,12 @@ def metric_column(name: str, title: str = "", **given: object) -> Column:
         digits=2 if name.endswith("_fraction") else digits,
         percent=name.endswith("_fraction"),
         angles=is_of_angles(name),
+        tie=tolerance(name),
     )
-    return Column(**{**column.__dict__, **given})
+    return replace(column, **given)
 
 
 def metric_title(name: str) -> str:
-    """Label and unit of a metric; `seconds` counts as one."""
-    column = metric_column(name)
-    unit = "" if name == "seconds" or not METRICS[name].unit else f" [{METRICS[name].unit}]"
-    return f"{column.title}{' %' if column.percent else unit}"
+    """Label, unit and better direction of a metric; the times of TIMES count as metrics."""
+    unit = "" if name in TIMES or not METRICS[name].unit else f" [{METRICS[name].unit}]"
+    return metric_column(name, f"{metric_column(name).title}{unit}").head

@@ -18,6 +18,7 @@ COPY = (  # an external program: every vertex to its x and y
     " {input} {output}"
 )
 ARGUMENTS = {
+    "computed": {"points": 150},
     "unwrap": {"points": 120},
     "meshed": {"reconstruction": "ball_pivoting"},  # the faster one
     "external": {"command": COPY},

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from baselines import registry
 from benchmarks.cases import builtin
-from benchmarks.metrics.table import evaluate
+from benchmarks.metrics.evaluation import evaluate
 from parapoint.computed.computed_map import ComputedMap
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError

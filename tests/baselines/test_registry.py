@@ -114,7 +114,6 @@ for name in ("torch", "xatlas", "pymeshlab", "uvunwrap", "baselines.disks.slim")
 def test_every_built_in_method_is_described():
     for name in registry.METHODS:
         about = registry.describe(name)
-        assert about.name == name
         assert about.summary.endswith((".", ")", "."))
     about = registry.describe("slim")
     assert about.requires == ("disk_after_cut", "faces")
@@ -222,7 +221,7 @@ def test_installed_package_that_cannot_be_imported_says_so(tmp_path, monkeypatch
     monkeypatch.syspath_prepend(tmp_path)
     registry._installed.cache_clear()
     assert "broken" in registry.names()
-    with pytest.raises(InputError, match=r"broken .* cannot be imported"):
+    with pytest.raises(InputError, match=r"broken .* does not run: ModuleNotFoundError"):
         registry.method("broken")
     registry._installed.cache_clear()
 

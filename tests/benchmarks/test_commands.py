@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 
 import numpy as np
 import pytest
 
+from baselines import registry
 from benchmarks import __main__ as commands
 from benchmarks.cases import models, suites
 from benchmarks.running import planning, runner
@@ -95,7 +97,15 @@ def test_help_is_light():
         ["run", "--seeds", "one"],
         ["run", "--seeds", "-1"],
         ["run", "--jobs", "0"],
+        ["run", "--seeds", str(10**23)],
+        ["run", "--seeds", str(2**32)],
+        ["run", "--jobs", str(10**20)],
         ["run", "--timeout", "0"],
+        ["run", "--timeout", "nan"],
+        ["run", "--timeout", "inf"],
+        ["run", "--timeout", "1e308"],
+        ["run", "--memory", "nan"],
+        ["run", "--memory", "1e308"],
         ["run", "--memory", "x"],
         ["run", "--plugin", "missing.py:Class"],
         ["run", "--nonsense"],
@@ -114,6 +124,34 @@ def test_wrong_use_is_one_line_and_status_2_and_nothing_written(
     assert shown.err.startswith("error: ")
     assert shown.err.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+RAISED = ["SystemExit", "SystemExit(0)", "GeneratorExit()", "MemoryError()", "OSError(28, 'full')"]
+BEGINNING = """
+from dataclasses import dataclass
+from typing import ClassVar
+
+@dataclass(frozen=True)
+class Rude:
+    requires: ClassVar[frozenset[str]] = frozenset()
+    def __post_init__(self):
+        raise {raised}
+    def parameterize(self, surface, *, seed): ...
+"""
+
+
+@pytest.mark.parametrize("raised", RAISED)
+@pytest.mark.parametrize("source", ["raise {raised}", BEGINNING], ids=["file", "method"])
+def test_a_plugin_that_exits_is_one_line_and_status_2(
+    source, raised, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(registry, "_plugins", {})
+    (tmp_path / "rude.py").write_text(source.format(raised=raised))
+    assert command("run", "--plugin", "rude.py:Rude", "--cases", "half_cylinder") == 2
+    shown = capsys.readouterr()
+    assert re.fullmatch(r"error: rude(\.py)? does not run: \w+:.*\n", shown.err)
+    assert [path.name for path in tmp_path.iterdir() if path.name != "__pycache__"] == ["rude.py"]
 
 
 def test_a_run_goes_from_a_file_and_a_plugin_to_a_checked_folder(

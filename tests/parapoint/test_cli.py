@@ -239,3 +239,17 @@ def test_a_diverged_fit_is_one_line(cloud, tmp_path, monkeypatch, capsys) -> Non
 
 def test_bad_input_is_an_input_error() -> None:
     assert issubclass(InputError, ValueError)
+
+
+@pytest.mark.parametrize("command", ["fit", "unwrap"])
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("--time-budget", value) for value in ("1e308", "1e10", "nan", "inf", "0", "-1")]
+    + [("--seed", value) for value in (str(10**23), str(2**32), "-1")],
+)
+def test_numbers_out_of_range_are_one_line(command, option, value, cloud, capsys) -> None:
+    """Nothing is written."""
+    out = cloud.parent / ("model" if command == "fit" else "map.obj")
+    status, said, err = run([command, str(cloud), "--out", str(out), option, value], capsys)
+    assert (status, said, err.count("\n")) == (2, "", 1)
+    assert list(cloud.parent.iterdir()) == [cloud]

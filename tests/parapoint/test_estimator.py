@@ -81,7 +81,7 @@ def test_a_wrong_parameter_is_one_line(parameters: dict[str, object], message: s
     ("points", "message"),
     [
         (np.repeat(paraboloid(60), 5, axis=0), "60 distinct points; a fit needs at least 100"),
-        (np.outer(np.linspace(0, 1, 500), [1.0, 2.0, 3.0]), "on a line"),
+        (np.outer(np.linspace(0, 1, 500), [1.0, 2.0, 3.0]), "along a curve"),
         (np.full((500, 3), math.nan), "at least one point"),
         (np.zeros((500, 2)), r"shape \(n, 3\)"),
     ],

@@ -56,13 +56,15 @@ def test_a_module_that_is_not_there_is_an_error():
 
 DEPENDENCIES = {
     "parapoint/surfaces/__init__.py": "parapoint.surfaces.cutting",
-    "parapoint/surfaces/surface.py": "benchmarks.metrics.table",
-    "benchmarks/metrics/overlap.py": "benchmarks.metrics.table",
+    "parapoint/surfaces/surface.py": "benchmarks.metrics.evaluation",
+    "benchmarks/metrics/overlap.py": "benchmarks.metrics.evaluation",
+    "benchmarks/metrics/table.py": "benchmarks.metrics.evaluation",
+    "benchmarks/metrics/reference.py": "benchmarks.metrics.evaluation",
     "parapoint/files/pcd.py": "parapoint.files.reading",
     "parapoint/learned/losses.py": "parapoint.learned.parapoint",
     "parapoint/computed/scale.py": "parapoint.unwrapping.unwrap",
     "parapoint/planar/tutte.py": "baselines.disks.slim",
-    "reports/pictures/render.py": "reports.pictures.drawing",
+    "benchmarks/rendering/scene.py": "reports.pictures.drawing",
 }
 """Files, and a module that depends on each."""
 

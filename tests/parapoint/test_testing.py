@@ -1,5 +1,7 @@
 """check_method finds each broken promise."""
 
+import subprocess
+import sys
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -10,7 +12,7 @@ from parapoint.method import REQUIREMENTS, UnsupportedError
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization, TracePoint
 from parapoint.surfaces.preparation import prepared
 from parapoint.surfaces.surface import Mesh, PointCloud
-from parapoint.testing import check_method, irregular_disk, sample_surfaces
+from parapoint.testing import BrokenPromiseError, check_method, irregular_disk, sample_surfaces
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,45 @@ class Meddling(Good):
 
 
 @dataclass(frozen=True)
+class OfOnePlace(Good):
+    """Rounds to single precision before it moves the surface to the origin."""
+
+    def of_mesh(self, mesh):
+        rounded = mesh.vertices.astype(np.float32).astype(np.float64)
+        return Parameterization((rounded - rounded.mean(axis=0))[:, :2], mesh.faces)
+
+
+@dataclass(frozen=True)
+class OfOneUnit(Good):
+    """Sees nothing that is smaller than a tenth."""
+
+    def of_mesh(self, mesh):
+        fine = np.floor((mesh.vertices - mesh.vertices.min(axis=0)) / 0.1) * 0.1
+        return Parameterization(fine[:, :2] + 1e-3 * mesh.vertices[:, :2], mesh.faces)
+
+
+@dataclass(frozen=True)
+class Failing(Good):
+    def of_mesh(self, mesh):
+        if np.abs(mesh.vertices).max() > 1e3:
+            raise ValueError("too far")
+        return super().of_mesh(mesh)
+
+
+@dataclass(frozen=True)
+class Drawn(Good):
+    """A map of each seed's own, which place and unit change no more than another seed does."""
+
+    def parameterize(self, surface, *, seed):
+        seeds = [seed, int(np.abs(surface.points).max() if isinstance(surface, PointCloud) else 0)]
+        if isinstance(surface, Mesh):
+            seeds[1] = int(np.abs(surface.vertices).max())
+            factor = np.random.default_rng(seeds).uniform(1, 2)
+            return Parameterization(surface.vertices[:, :2] * [1, factor], surface.faces)
+        return super().parameterize(surface, seed=seed)
+
+
+@dataclass(frozen=True)
 class Picky(Good):
     def of_mesh(self, mesh):
         if mesh.component_count > 1:
@@ -140,6 +181,7 @@ def test_honest_methods_pass():
     check_method(Good())
     check_method(MeshOnly())
     check_method(Picky(), irregular_disk())
+    check_method(Drawn())
 
 
 @pytest.mark.parametrize(
@@ -151,6 +193,9 @@ def test_honest_methods_pass():
         (Shuffled(), "not in the order of the mesh"),
         (Collapsed(), "collapsed to a line"),
         (Unseeded(), "another map under the same seed"),
+        (OfOnePlace(), r"moved by 500000 times .* has another map: lengths or areas differ by"),
+        (OfOneUnit(), "scaled by 1e-06, it has another map"),
+        (Failing(), r"moved by 6e\+06 times .* cannot be mapped: too far"),
         (Meddling(), "changed the surface's vertices"),
         (Picky(), "on two components: refused, though it meets `requires`"),
         (WrongType(), "returned PointParameterization; a mesh needs a Parameterization"),
@@ -165,8 +210,22 @@ def test_honest_methods_pass():
     ids=lambda value: getattr(value, "__name__", type(value).__name__),
 )
 def test_broken_promise_is_named(method, promise):
-    with pytest.raises(AssertionError, match=promise):
+    with pytest.raises(BrokenPromiseError, match=promise):
         check_method(method)
+
+
+def test_a_broken_promise_is_found_when_python_optimizes_too():
+    code = (
+        "from baselines.disks.tutte import Tutte\n"
+        "from parapoint.testing import BrokenPromiseError, check_method\n"
+        "try:\n"
+        "    check_method(Tutte)\n"
+        "except BrokenPromiseError as error:\n"
+        "    print(error)\n"
+    )
+    command = [sys.executable, "-O", "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout == "type: give a method, not its class\n"
 
 
 def test_method_that_can_do_nothing_here_is_unsupported():

@@ -11,8 +11,8 @@ from PIL import Image
 pytest.importorskip("playwright", reason="playwright is not installed")
 from playwright.sync_api import sync_playwright
 
+from benchmarks.rendering.maps import Map
 from reports.contents import contents
-from reports.pictures.drawing import Map
 
 from .conftest import HAND, NEFERTITI
 

@@ -2,7 +2,17 @@ import math
 
 import pytest
 
-from reports.ranking import grade_of, is_of_angles, may_rank, ranks, worst
+from reports.ranking import (
+    TIME_TIE,
+    grade_of,
+    is_of_angles,
+    marks,
+    may_rank,
+    means_may_rank,
+    ranks,
+    tolerance,
+    worst,
+)
 from reports.tables.table import Column, Table
 
 
@@ -23,6 +33,36 @@ def test_ranks_are_those_of_a_competition(values, better, expected):
 
 def test_what_prints_alike_is_equal():
     assert ranks([0.101, 0.099, 0.5], ["0.10", "0.10", "0.50"], "lower") == [1, 1, 3]
+
+
+def test_a_chain_of_ties_does_not_end_in_one_place():
+    values = [1.0, 1.04, 1.08, 1.12]
+    texts = [str(value) for value in values]
+    # Each is within a twentieth of the one before; 1.08 is not of the first, 1.12 is of 1.08.
+    assert ranks(values, texts, "lower", 0.05) == [1, 1, 3, 3]
+    assert ranks([-value for value in values], texts, "higher", 0.05) == [1, 1, 3, 3]
+
+
+def test_each_metric_has_its_own_tolerance():
+    assert tolerance("seconds") == tolerance("cpu_seconds") == TIME_TIE
+    assert tolerance("chart_count") == 0  # 100 charts are fewer than 100.04
+    assert 0 < tolerance("angle_difference_mean") < TIME_TIE
+
+
+def test_where_all_are_alike_nobody_is_best():
+    assert marks([2.0, 2.0], ["2.0", "2.0"], "lower") == ["", ""]
+    assert marks([2.0, None], ["2.0", "–"], "lower") == ["", ""]
+    assert marks([2.0, 1.0, 1.0, 3.0], list("2113"), "higher") == ["second", "", "", "best"]
+    assert marks([1.0, 1.0, 2.0], list("112"), "lower") == ["best", "best", ""]
+
+
+@pytest.mark.parametrize(("bad", "fit"), [(0, True), (1, True), (2, False), (10, False)])
+def test_means_over_too_many_broken_maps_are_not_ranked(bad, fit):
+    grades = ["broken"] * bad + ["usable"] * (10 - bad)
+    assert means_may_rank(grades, angles=False) == fit
+    collapsed = ["collapsed"] * bad + ["usable"] * (10 - bad)
+    assert means_may_rank(collapsed, angles=True)
+    assert means_may_rank([], angles=True)
 
 
 @pytest.mark.parametrize(
@@ -84,8 +124,8 @@ def test_a_folded_map_with_the_smallest_value_is_never_best():
         Column("area", "area", better="lower"),
     )
     made = Table("t", "T", "", columns, (rows,))
-    marks = [[cell.mark for cell in row] for row in made.cells[0]]
-    assert marks == [["", "", ""], ["", "best", ""], ["", "second", "best"], ["", "", "second"]]
+    given = [[cell.mark for cell in row] for row in made.cells[0]]
+    assert given == [["", "", ""], ["", "best", ""], ["", "second", "best"], ["", "", "second"]]
 
 
 def test_in_a_row_of_methods_each_cell_has_its_own_grade():

@@ -14,11 +14,12 @@ from parapoint.surfaces.parameterization import Parameterization, PointParameter
 from parapoint.surfaces.surface import PointCloud
 from reports.__main__ import main
 from reports.contents import contents
+from reports.page.sections import Section
 from reports.report import write
 
 from .conftest import HAND, SLIM, Writer, flat, sheet
 
-VOID = {"meta", "img", "br", "link", "input", "hr"}
+VOID = {"meta", "img", "br", "link", "input", "hr", "source"}
 
 
 class Page(html.parser.HTMLParser):
@@ -35,7 +36,7 @@ class Page(html.parser.HTMLParser):
         if tag not in VOID:
             self.open.append(tag)
         for name, value in attrs:
-            if name in {"src", "href"}:
+            if name in {"src", "href", "srcset"}:
                 self.addresses.append(value)
             if name == "id":
                 self.ids.append(value)
@@ -219,3 +220,32 @@ def test_reports_leave_torch_alone():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_the_index_shows_every_model_under_every_method_with_grade_and_flips(tmp_path):
+    mesh = sheet()
+    folded = flat(mesh).uv * [1, 1]
+    folded[:, 0] = np.abs(folded[:, 0] - 0.3)  # laid over itself along a line
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for case in ("one", "two"):
+            writer.cell(case, mesh, "lscm", {}, result=flat(mesh))
+            bad = Parameterization(folded, mesh.faces)
+            writer.cell(case, mesh, "parapoint", {"preset": "paper"}, result=bad)
+        writer.cell("two", mesh, "arap", {}, status="timeout", reason="over 10 s")
+    write(tmp_path, jobs=1)
+    section = Section(tmp_path / "report", contents(tmp_path)[0], (), (), ())
+    assert list(section.examples) == ["one", "two"]
+    order = [label.short for label in section.contents.methods]
+    shown = {case: dict(zip(order, maps, strict=True)) for case, maps in section.examples.items()}
+    assert shown["one"]["LSCM"].said == "usable"
+    assert len(shown["one"]["LSCM"].pictures) == 1
+    bad = shown["one"]["ParaPoint"]
+    assert bad.mark == "bad"
+    assert re.fullmatch(r"broken, \d+\.\d\d % flipped", bad.said)
+    assert len(bad.pictures) == 2  # the flips may lie on the other side
+    assert (shown["two"]["ARAP"].said, shown["two"]["ARAP"].pictures) == ("timeout", ())
+    assert shown["one"]["ARAP"].said == ""  # not run
+    text = parsed(tmp_path / "report" / "index.html").text
+    assert "Every model under every method" in text
+    assert "paper" in text  # the preset is named

@@ -1,8 +1,11 @@
 """The registry against the files, names, the mirror, the network that is not there."""
 
+import contextlib
 import hashlib
+import http.server
 import os
 import re
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -56,7 +59,7 @@ def test_registry_is_complete_and_consistent():
         assert re.fullmatch(r"[0-9a-f]{64}", model.sha256)
         assert re.search(r"/([0-9a-f]{40}|v5\.5\.1)/", model.url), "an address at a commit or tag"
         assert model.licence
-        assert (model.faces == 0) == (model.kind == "point cloud")
+        assert (model.faces == 0) == (model.topology == "point cloud")
         assert bool(model.paper_name) == bool(model.claim) == bool(model.claim_reason)
         assert model.claim in {None, "same model", "likely", "stand-in"}
 
@@ -233,6 +236,37 @@ def test_a_download_is_checked_and_kept(monkeypatch, tmp_path, capfd):
     assert models.missing(["cylinder_cgal"]) == {}
     captured = capfd.readouterr()
     assert captured.out == captured.err == ""  # no terminal, no progress
+
+
+class Endless(http.server.BaseHTTPRequestHandler):
+    """Sends bytes for as long as anybody takes them."""
+
+    sent = 0
+
+    def do_GET(self):
+        self.send_response(200)
+        self.end_headers()
+        with contextlib.suppress(OSError):
+            while True:
+                Endless.sent += self.wfile.write(bytes(1 << 16))
+
+    def log_message(self, *_):
+        """Say nothing."""
+
+
+def test_a_download_takes_no_more_than_the_registered_size(monkeypatch, tmp_path):
+    monkeypatch.delenv(models.MIRROR, raising=False)
+    monkeypatch.setattr(models, "cache_folder", lambda: tmp_path)
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Endless) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        address = f"http://127.0.0.1:{server.server_port}/endless"
+        model = replace(models.registry()["cylinder_cgal"], url=address, size=300_000)
+        monkeypatch.setitem(models.registry(), "cylinder_cgal", model)
+        with pytest.raises(InputError, match="has more than 300000 bytes"):
+            models.load("cylinder_cgal")
+        server.shutdown()
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+    assert Endless.sent < 20_000_000  # what lay in buffers
 
 
 def test_the_mirror_is_used_and_checked(no_network, mirror, monkeypatch):

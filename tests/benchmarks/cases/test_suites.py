@@ -1,5 +1,7 @@
 """Suites: every name in them exists."""
 
+import dataclasses
+
 import pytest
 
 from baselines import registry
@@ -43,3 +45,72 @@ def test_the_suites():
 def test_an_unknown_suite_names_all():
     with pytest.raises(InputError, match="perhaps paper; there are smoke, builtin"):
         suite("papier")
+
+
+def parameters(spec: str) -> dict[str, object]:
+    """All parameters of a spec, its method's name among them."""
+    name, method = registry.method(spec)
+    return {"method": name, **dataclasses.asdict(method)}
+
+
+def changed(spec: str, other: str) -> dict[str, object]:
+    """What `other` has where it differs from `spec`."""
+    before, after = parameters(spec), parameters(other)
+    return {name: value for name, value in after.items() if value != before[name]}
+
+
+def test_each_ablation_changes_one_option_of_the_paper_s_training():
+    paper, *ablations = SUITES["ablation"].methods
+    assert parameters(paper)["preset"] == "paper"
+    assert [changed(paper, spec) for spec in ablations] == [
+        {"distortion": "isometric"},
+        {"branches": "2d"},
+        {"branches": "3d"},
+        {"distortion_weight": 1e-4},
+    ]
+
+
+def test_our_training_differs_from_the_paper_s_by_its_preset_alone():
+    assert changed(*SUITES["seeds"].methods) == {"preset": "learned"}
+
+
+def test_the_neural_maps_have_the_same_budget():
+    assert {parameters(spec)["time_budget"] for spec in SUITES["neural"].methods} == {150.0}
+    assert {parameters(spec)["subset"] for spec in SUITES["neural"].methods[2:]} == {256}
+
+
+def test_one_iteration_of_slim_is_told_from_all():
+    isometric, once = SUITES["paper"].methods[2:4]
+    assert changed(isometric, once) == {"iterations": 1}
+    assert parameters(isometric)["energy"] == "symmetric_dirichlet"
+
+
+def test_a_cell_runs_once_unless_a_suite_is_about_seeds():
+    several = {name: suite.seeds for name, suite in SUITES.items() if suite.seeds != (0,)}
+    assert several == {"seeds": (0, 1, 2, 3, 4), "quality": (0, 1, 2)}
+
+
+def test_every_reconstruction_meets_every_flattening():
+    pairs = {
+        (parameters(spec)["reconstruction"], parameters(spec)["flattening"])
+        for spec in SUITES["noise"].methods
+        if spec.startswith("meshed")
+    }
+    assert pairs == {
+        (reconstruction, flattening)
+        for reconstruction in ("poisson", "ball_pivoting")
+        for flattening in ("xatlas", "lscm", "slim")
+    }
+    assert len(SUITES["noise"].cases) == 4 * 4
+    assert sum(case.endswith("@noise=0") for case in SUITES["noise"].cases) == 4
+
+
+def test_sets_are_those_of_the_registry():
+    sets = {
+        name: {models.registry()[case].set for case in SUITES[name].cases}
+        for name in ("disk", "closed", "genus", "cad", "wild", "scans", "artist", "cuts", "core")
+    }
+    for name in ("disk", "closed", "genus", "cad", "wild", "scans", "artist"):
+        assert sets[name] == {name}
+    assert sets["cuts"] == {"artist", "closed", "genus"}
+    assert sets["core"] == {"paper", "disk", "closed", "genus", "cad", "artist"}

@@ -7,7 +7,8 @@ import sys
 
 from benchmarks.checks import endurance, faulty
 from benchmarks.running.environment import ROOT
-from benchmarks.store.results import ResultRow, Store, identity
+from benchmarks.store.results import Store
+from benchmarks.store.rows import ResultRow, identity
 
 KILLS = """
 import sys

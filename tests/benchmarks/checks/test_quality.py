@@ -11,7 +11,7 @@ from baselines import registry
 from benchmarks.cases import models
 from benchmarks.checks.losses import RUNS, first_losses, golden_losses
 from benchmarks.checks.regress import COMPUTED, cell, golden_rows, moves, tolerances
-from benchmarks.store.results import measured
+from benchmarks.store.measuring import measured
 from parapoint.surfaces.preparation import prepared
 
 SEAM_EDGES = 0.03

@@ -10,7 +10,7 @@ from benchmarks.commands.metric_speed import (
     metric_table,
     speed_map,
 )
-from benchmarks.metrics.table import evaluate
+from benchmarks.metrics.evaluation import evaluate
 
 
 @pytest.mark.parametrize(("kind", "charts"), [("disk", 1), ("atlas", 100)])

@@ -8,7 +8,9 @@ from numpy.testing import assert_allclose
 from benchmarks.cases import builtin, models
 from benchmarks.metrics import distortion
 from benchmarks.metrics.distortion import face_distortion, triangles
-from benchmarks.metrics.table import METRICS, MapState, evaluate
+from benchmarks.metrics.evaluation import evaluate
+from benchmarks.metrics.state import MapState
+from benchmarks.metrics.table import METRICS
 from parapoint import Mesh, Parameterization
 
 DISTORTIONS = [m for m in METRICS.values() if m.group in ("conformal", "authalic", "isometric")]

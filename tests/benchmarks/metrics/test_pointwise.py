@@ -6,8 +6,9 @@ from numpy.testing import assert_allclose
 from scipy.spatial import cKDTree, distance
 
 from benchmarks.cases import builtin
+from benchmarks.metrics.evaluation import evaluate_points
 from benchmarks.metrics.pointwise import nearest_others, point_map
-from benchmarks.metrics.table import METRICS, evaluate_points
+from benchmarks.metrics.table import METRICS
 from parapoint import InputError, PointCloud, PointParameterization
 
 EXACT = 1e-9
@@ -35,6 +36,15 @@ def test_a_similarity_is_perfect(scale):
         if ideal is not None:
             assert_allclose(values[name], ideal, atol=1e-6 if scale < 1 else EXACT, err_msg=name)
     assert values["spanning_point_fraction"] == 0
+
+
+@pytest.mark.parametrize("stretch", [1.0, 3.0])
+def test_scan_lines_are_judged_across_the_lines(stretch):
+    """Lines 20 times as far apart as their points: the eight nearest all lie on one."""
+    x, y = np.meshgrid(np.arange(60.0), 20 * np.arange(6.0))
+    points = np.stack([x.ravel(), y.ravel()], axis=1)
+    values = scores(points, points * [1, stretch])
+    assert_allclose(values["local_quasi_conformal_mean"], stretch, atol=1e-6)
 
 
 @pytest.mark.parametrize("k", [2.0, 7.0])

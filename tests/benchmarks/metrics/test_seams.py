@@ -7,7 +7,8 @@ from numpy.testing import assert_allclose
 from baselines import registry
 from benchmarks.cases import builtin, models
 from benchmarks.metrics import seams
-from benchmarks.metrics.table import MapState, evaluate
+from benchmarks.metrics.evaluation import evaluate
+from benchmarks.metrics.state import MapState
 from parapoint import Mesh, Parameterization
 
 EXACT = 1e-12

@@ -7,8 +7,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from benchmarks.cases import builtin
-from benchmarks.metrics import table as metrics
-from benchmarks.metrics.table import METRICS, WITHOUT_SPANNING, evaluate
+from benchmarks.metrics import state
+from benchmarks.metrics.evaluation import evaluate
+from benchmarks.metrics.metric import GROUPS, WITHOUT_SPANNING
+from benchmarks.metrics.table import METRICS
 from parapoint import InputError, Mesh, Parameterization
 
 NAMES = {
@@ -103,7 +105,7 @@ def test_the_registry_has_every_metric_and_says_all_about_it():
         assert metric.weighting
         assert metric.source
         assert metric.better in ("lower", "higher")
-        assert metric.group in metrics.GROUPS
+        assert metric.group in GROUPS
         twin = name + WITHOUT_SPANNING in METRICS
         if not name.endswith(WITHOUT_SPANNING) and metric.group != "points":
             assert twin == (metric.group in ("conformal", "authalic", "isometric") or name in TWICE)
@@ -298,7 +300,7 @@ def test_seam_excess_is_what_the_cut_is_longer():
 def test_what_metrics_share_is_computed_once(monkeypatch):
     mesh, parameterization = two_charts(0)
     calls = []
-    original = metrics.triangles
-    monkeypatch.setattr(metrics, "triangles", lambda *a: calls.append(1) or original(*a))
+    original = state.triangles
+    monkeypatch.setattr(state, "triangles", lambda *a: calls.append(1) or original(*a))
     evaluate(mesh, parameterization)
     assert len(calls) == 1

@@ -3,12 +3,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 from benchmarks.cases.builtin import grid_faces
+from benchmarks.metrics.evaluation import evaluate, evaluate_points
 from benchmarks.metrics.pointwise import (
     point_map,
     point_part_area_ratio_min,
     starved_point_fraction,
 )
-from benchmarks.metrics.table import METRICS, evaluate, evaluate_points
+from benchmarks.metrics.table import METRICS
 from benchmarks.metrics.usability import _lines
 from parapoint import InputError, Mesh, Parameterization, PointCloud, PointParameterization
 

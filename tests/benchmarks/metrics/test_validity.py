@@ -11,7 +11,8 @@ from numpy.testing import assert_allclose
 from benchmarks.cases import builtin
 from benchmarks.metrics import overlap, validity
 from benchmarks.metrics.distortion import triangles
-from benchmarks.metrics.table import MapState, evaluate
+from benchmarks.metrics.evaluation import evaluate
+from benchmarks.metrics.state import MapState
 from parapoint import Mesh, Parameterization
 
 EXACT = 1e-12

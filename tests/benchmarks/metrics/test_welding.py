@@ -3,7 +3,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from benchmarks.cases.builtin import grid_faces
-from benchmarks.metrics.table import MapState, evaluate
+from benchmarks.metrics.evaluation import evaluate
+from benchmarks.metrics.state import MapState
 from benchmarks.metrics.welding import places
 from parapoint import Mesh, Parameterization
 from parapoint.testing import sphere

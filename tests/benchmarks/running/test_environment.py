@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from types import SimpleNamespace
+
+import psutil
 import pytest
 
 from benchmarks.running import environment
@@ -19,3 +23,22 @@ def test_every_source_file_of_the_project_counts(tmp_path, monkeypatch, place):
     second = environment.project.__wrapped__()
     path.rename(path.with_name("b.py"))
     assert len({first, second, environment.project.__wrapped__()}) == 3
+
+
+@pytest.mark.parametrize(
+    ("variable", "jobs", "threads"),
+    [("", 1, 6), ("", 4, 1), ("", 3, 2), ("", 9, 1), ("3", 4, 3), ("0", 3, 2), ("many", 3, 2)],
+)
+def test_cells_share_the_cores_unless_the_user_says_how_many_threads(
+    monkeypatch, variable, jobs, threads
+):
+    monkeypatch.setattr(environment, "cores", lambda: 6)
+    monkeypatch.setenv("OMP_NUM_THREADS", variable)
+    assert environment.threads(jobs) == threads
+
+
+@pytest.mark.parametrize(("limit", "memory"), [("max", 1000), ("400\n", 400), ("4000", 1000)])
+def test_the_memory_of_a_container_is_its_limit(monkeypatch, limit, memory):
+    monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(total=1000))
+    monkeypatch.setattr(Path, "read_text", lambda _: limit)
+    assert environment.memory() == memory

@@ -19,6 +19,7 @@ import pytest
 from benchmarks.cases.suites import Suite
 from benchmarks.running import cluster, environment, executors, runner
 from benchmarks.running.tasks import Outcome
+from benchmarks.store import measuring, verifying
 from benchmarks.store.results import Store
 from parapoint.errors import InputError
 
@@ -158,8 +159,8 @@ def test_a_run_on_two_workers_one_of_which_dies_gives_the_rows_of_a_local_one(
     assert failed.reason == "ended the process (exit status 3) with no result"
     assert failed.output == "the last words"
     assert all(environment.processor() in row.host for row in summary.ran)
-    assert not list(Store(tmp_path / "far").faults())
-    assert len(Store(tmp_path / "far").metrics()["angle_difference_mean"].dropna()) == 5
+    assert not list(verifying.faults(Store(tmp_path / "far")))
+    assert len(measuring.metrics(Store(tmp_path / "far"))["angle_difference_mean"].dropna()) == 5
     # The killed worker's cell has ended with it.
     cells = [int(note.name.split("-")[1]) for note in (tmp_path / "notes").iterdir()]
     wait_until(lambda: not any(psutil.pid_exists(cell) for cell in cells))

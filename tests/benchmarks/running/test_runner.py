@@ -21,10 +21,12 @@ from baselines import registry
 from benchmarks.cases import models
 from benchmarks.cases.suites import Suite
 from benchmarks.checks import endurance
-from benchmarks.metrics.table import evaluate_points
+from benchmarks.metrics.evaluation import evaluate_points
 from benchmarks.running import cell, environment, executors, planning, runner, scratch
 from benchmarks.running.runner import Summary, run
-from benchmarks.store.results import ResultRow, Store
+from benchmarks.store import measuring, verifying
+from benchmarks.store.results import Store
+from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
 
 METHOD = """
@@ -247,7 +249,7 @@ def test_all_other_cells_are_untouched(faulty):
     assert len(store.rows()) == len(FAULTS) + 1
     assert row_of(faulty, "tutte").status == "ok"
     assert row_of(faulty, "random").status == "ok"
-    assert not list(store.faults())
+    assert not list(verifying.faults(store))
     assert {row.id for row in summary.ran} == {row.id for row in store.rows()}
 
 
@@ -291,7 +293,7 @@ def test_the_environment_of_a_run_is_written(faulty):
 
 
 def test_metrics_of_all_cells_are_there_after_a_run(faulty):
-    frame = faulty[1].metrics()
+    frame = measuring.metrics(faulty[1])
     assert list(frame.columns[:6]) == ["suite", "case", "method", "params", "seed", "status"]
     assert len(frame) == len(FAULTS) + 1
     values = frame.set_index("method")["angle_difference_mean"]
@@ -423,7 +425,7 @@ def test_a_model_is_read_once_and_its_own_map_is_the_reference(tmp_path, monkeyp
         pytest.skip(str(error))
     fish = Suite("trial", "A trial", ("fish_control_mesh",), ("lscm",), (0,))
     run(fish, tmp_path)
-    assert Store(tmp_path).metrics()["artist_correlation"].notna().all()
+    assert measuring.metrics(Store(tmp_path))["artist_correlation"].notna().all()
     monkeypatch.setattr(models, "load", lambda case: pytest.fail(f"{case} is read again"))
     assert run(fish, tmp_path).ran == []
 
@@ -489,7 +491,7 @@ def test_a_file_that_may_not_grow_ends_the_run_and_keeps_what_is_there(tmp_path)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert [row.seed for row in Store(out).rows()] == list(range(9))
-    assert not list(Store(out).faults())
+    assert not list(verifying.faults(Store(out)))
     assert seeds(12) == [9, 10, 11]
 
 
@@ -555,7 +557,7 @@ def test_a_killed_run_loses_only_the_cell_in_flight(tmp_path):
     summary = run(custom, tmp_path / "out", plugins=[plugin], timeout=0.5)
     assert [(row.seed, row.status) for row in summary.ran] == [(2, "timeout")]
     assert summary.kept == done
-    assert not list(Store(tmp_path / "out").faults())
+    assert not list(verifying.faults(Store(tmp_path / "out")))
     assert "a torn li" in (tmp_path / "out" / "runs.torn").read_text()
     assert len(Store(tmp_path / "out").environment()["runs"]) == 2
 
@@ -579,7 +581,7 @@ def test_a_wild_map_has_no_metrics_but_its_run_ends(tmp_path, monkeypatch):
     (row,) = summary.ran
     assert row.status == "ok"
     assert row.id in summary.unmeasured
-    assert Store(tmp_path / "out").metrics()["angle_difference_mean"].isna().all()
+    assert measuring.metrics(Store(tmp_path / "out"))["angle_difference_mean"].isna().all()
     assert json.loads((tmp_path / "out" / "runs.jsonl").read_text())["status"] == "ok"
 
 
@@ -621,12 +623,12 @@ def test_a_noisy_cloud_is_mapped_and_its_points_without_noise_are_scored(tmp_pat
     (row,) = store.rows()
     cloud, exact = store.surface(row), models.exact_points(case)
     assert np.array_equal(cloud.points, models.load(case).points)
-    values = store.metrics().iloc[0]
+    values = measuring.metrics(store).iloc[0]
     truth, other = (evaluate_points(points, store.result(row)) for points in (exact, cloud))
     name = "local_quasi_conformal_mean"
     assert values[name] == pytest.approx(truth[name])
     assert truth[name] != pytest.approx(other[name], rel=1e-3)
-    assert list(store.faults()) == []
+    assert list(verifying.faults(store)) == []
 
 
 def test_the_seams_of_a_model_s_own_map_reach_the_methods_that_require_them_alone(tmp_path):

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +17,9 @@ from benchmarks.running import cell, worker
 from benchmarks.running.environment import ROOT
 from benchmarks.running.tasks import Outcome, Prepared, Ready, RunJob, from_json, to_json
 from benchmarks.store.archives import read_map, read_surface
-from benchmarks.store.results import Store, measured
+from benchmarks.store.measuring import measured
+from benchmarks.store.results import Store
+from benchmarks.store.rows import SOURCE_CHANGED
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization
 from parapoint.surfaces.surface import Mesh, PointCloud
 from parapoint.testing import sample_surfaces
@@ -192,3 +196,42 @@ def test_a_supervisor_does_one_cell_after_another(tmp_path, forks):
     printed, _ = process.communicate(timeout=30)
     assert printed == b"hello\nhello\n"
     assert process.returncode == 0
+
+
+def test_a_map_that_cannot_be_written_is_the_machine_s_fault(tmp_path, monkeypatch):
+    store = Store(tmp_path)
+    with store.writing():
+        surface = store.add_surface(TRIANGLE)
+    job = RunJob(
+        spec="tutte",
+        seed=0,
+        source_hash=registry.source_hash(registry.method("tutte")[1]),
+        surface=store.surface_path(surface),
+        folder=tmp_path,
+        time_limit=60.0,
+        memory_limit=1e9,
+    )
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(cell, "write_arrays", full)
+    with Path(os.devnull).open("wb") as ahead:
+        outcome = cell.run(job, ahead.fileno())
+    assert outcome.fatal
+    assert outcome.reason == f"{tmp_path}/map.npz: No space left on device"
+
+
+def test_a_cell_whose_method_has_changed_is_told_so(tmp_path):
+    store = Store(tmp_path)
+    with store.writing():
+        surface = store.add_surface(TRIANGLE)
+    job = RunJob(
+        spec="tutte",
+        seed=0,
+        source_hash="another",
+        surface=store.surface_path(surface),
+        time_limit=60.0,
+        memory_limit=1e9,
+    )
+    assert cell.run(job, -1) == Outcome("failed", SOURCE_CHANGED)

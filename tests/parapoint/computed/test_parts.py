@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.cases import builtin
-from benchmarks.metrics.table import evaluate
+from benchmarks.metrics.evaluation import evaluate
 from parapoint.computed.flattening import flattened
 from parapoint.computed.parts import MOST_STARVED, parts_kept
 from parapoint.planar.bijection import bijective_map, is_bijective

@@ -2,7 +2,7 @@ import igl
 import numpy as np
 import pytest
 
-from benchmarks.metrics.table import evaluate
+from benchmarks.metrics.evaluation import evaluate
 from parapoint.computed.layout import scaled_layout
 from parapoint.computed.scale import even_scale
 from parapoint.planar import bijection, scaffold

@@ -1,7 +1,7 @@
 """Growth of the seam to where places are starved of area."""
 
 from benchmarks.cases import builtin
-from benchmarks.metrics.table import evaluate
+from benchmarks.metrics.evaluation import evaluate
 from parapoint.planar.descent import Run
 from parapoint.planar.growth import grown
 from parapoint.surfaces.areas import MOST_STARVED, starved_share

@@ -4,11 +4,11 @@ import zlib
 import numpy as np
 import pytest
 
+from benchmarks.rendering.camera import camera as camera_on
+from benchmarks.rendering.maps import Map
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh
 from reports.page import viewer
-from reports.pictures import render
-from reports.pictures.drawing import Map
 
 from ..conftest import ball, flat, sheet
 
@@ -132,7 +132,7 @@ def test_surprises_are_undone_and_small_on_a_plane():
 
 def shape(mesh):
     """What is read of a shape: all, and its faces."""
-    camera = render.camera(mesh, np.eye(3)[2], np.eye(3)[1])
+    camera = camera_on(mesh, np.eye(3)[2], np.eye(3)[1])
     sky = np.linspace(0, 1, 2 * len(mesh.vertices)).reshape(-1, 2)
     _, given = read(viewer.script("a.js", *viewer.shape(mesh, camera, sky)))
     assert given["axes"] == camera.axes.tolist()
@@ -240,6 +240,6 @@ def test_levels_of_a_scale():
 def test_a_large_model_is_left_out_and_said(monkeypatch):
     monkeypatch.setattr(viewer, "LARGEST", 10)
     mesh = sheet()
-    camera = render.camera(mesh, np.eye(3)[2], np.eye(3)[1])
+    camera = camera_on(mesh, np.eye(3)[2], np.eye(3)[1])
     assert viewer.shape(mesh, camera, np.ones((81, 2))) == ({"large": 128}, {})
     assert data(mesh, flat(mesh))[1] == {"large": 128}

@@ -1,13 +1,15 @@
 import numpy as np
 import pytest
 
+from benchmarks.rendering.camera import camera
+from benchmarks.rendering.maps import FIELDS, Map, normal_colours
+from benchmarks.rendering.scene import Scene
+from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
-from parapoint.surfaces.parameterization import PointParameterization
+from parapoint.surfaces.parameterization import Parameterization, PointParameterization
 from parapoint.surfaces.surface import Mesh, PointCloud
-from reports.pictures import clouds, render
+from reports.pictures import clouds
 from reports.pictures.clouds import surface_points
-from reports.pictures.drawing import FIELDS, Map, normal_colours
-from reports.pictures.render import Scene
 
 from ..conftest import ball, flat, lonlat, sheet
 
@@ -37,10 +39,10 @@ def test_uv_is_interpolated_but_taken_whole_where_a_face_spans_a_seam():
 
 def drawn(mesh, result):
     scene = Scene(mesh)
-    view = scene.view(render.camera(mesh, np.eye(3)[2], np.eye(3)[1]), 64, 2)
+    view = scene.view(camera(mesh, np.eye(3)[2], np.eye(3)[1]), 64, 2)
     found = Map(mesh, result)
     colours = normal_colours(scene, view.camera)
-    return view, clouds.images(view, found.uv, found.spanning, colours, FIELDS / scene.size)
+    return view, clouds.images(view, found, colours, FIELDS / scene.size, 400)
 
 
 def test_only_the_dense_picture_fills_the_surface():
@@ -62,6 +64,36 @@ def test_points_on_faces_that_span_the_seam_are_green():
     turned = ball().vertices[:, [1, 2, 0]] * [1, 1, -1]  # the date line faces the camera
     mesh = Mesh(turned, ball().faces)
     assert greens(mesh, lonlat(ball())) > 0
+
+
+def test_flipped_faces_are_orange_in_the_texture():
+    mesh = sheet()
+    uv = flat(mesh).uv.copy()
+    uv[:, 0] = np.abs(uv[:, 0] - 0.3)  # the smaller part is turned over
+    flips = Map(mesh, Parameterization(uv, mesh.faces)).flipped.mean()
+    assert 0.2 < flips < 0.4
+
+    def oranges(result):
+        red, green, blue, _ = np.moveaxis(drawn(mesh, result)[1]["dense"].astype(int), 2, 0)
+        return ((red > green + 60) & (green > blue + 20)).mean()
+
+    assert oranges(flat(mesh)) == 0
+    assert oranges(Parameterization(uv, mesh.faces)) == pytest.approx(flips, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("report", "params", "count"),
+    [
+        ({"points": 2048}, {"points": 10_000}, 2048),  # what was used, not what was asked for
+        ({}, {"points": 500}, 500),
+        ({}, {"points": None}, 10_000),
+        ({"points": 10**6}, {}, clouds.MOST_POINTS),
+    ],
+)
+def test_a_cloud_is_drawn_of_the_points_that_were_used(report, params, count, monkeypatch):
+    monkeypatch.setattr(clouds, "SPARSE", 10_000)
+    row = ResultRow("i", "s", "c", "parapoint", params, 0, "", "", "ok", report=report)
+    assert clouds.points_used(row) == count
 
 
 def waves(count=400):

@@ -5,12 +5,13 @@ import numpy as np
 import pytest
 from PIL import Image as Images
 
+from benchmarks.rendering.colours import linear
+from benchmarks.rendering.maps import ANGLE_SCALE, Map, heat
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh
 from reports.contents import contents
-from reports.pictures import drawing as pictures
-from reports.pictures import render
-from reports.pictures.drawing import Map, draw, heat, known_keys, map_file, slug
+from reports.pictures.drawing import draw, known_keys
+from reports.pictures.names import ARTIST_PICTURES, map_file, model_file, slug
 
 from ..conftest import HAND, HOSTILE, NEFERTITI, Writer, ball, flat, lonlat, sheet
 
@@ -57,9 +58,9 @@ def test_a_face_without_uv_area_has_the_worst_colour():
     found = Map(mesh, Parameterization(uv, mesh.faces))
     assert found.angle[0] == np.inf
     assert found.area[0] == -np.inf
-    colours = heat(np.array([0.0, np.inf, 2.0, np.nan]), pictures.ANGLE_SCALE)
+    colours = heat(np.array([0.0, np.inf, 2.0, np.nan]), ANGLE_SCALE)
     np.testing.assert_array_equal(colours[1], colours[2])
-    np.testing.assert_allclose(colours[3], render.linear([0.8] * 3))
+    np.testing.assert_allclose(colours[3], linear([0.8] * 3))
 
 
 def test_pictures_are_drawn_once_and_again_when_something_changed(results, tmp_path):
@@ -115,7 +116,7 @@ def test_the_artist_s_map_is_drawn_where_a_model_came_with_one(tmp_path):
     suite = contents(tmp_path)[0]
     folder = tmp_path / "pictures"
     assert draw(suite, folder, 1) == []
-    made = [folder / pictures.model_file(HAND, kind) for kind in pictures.ARTIST_PICTURES]
+    made = [folder / model_file(HAND, kind) for kind in ARTIST_PICTURES]
     assert all(path.exists() for path in made)
     assert suite.has_artist(HAND)
     made[0].unlink()

@@ -1,17 +1,21 @@
 import dataclasses
 import pickle
+from importlib import resources
 
 import numpy as np
+import pandas as pd
 import pytest
+from matplotlib.colors import to_hex, to_rgba
 from matplotlib.text import Text
+from PIL import Image as Images
 from pypdf import PdfReader
 
 from reports import contents as contents_module
-from reports.contents import contents
+from reports.contents import ANGLE, AREA, contents
 from reports.pictures import figures, galleries, plots
 from reports.pictures.figures import draw, drawings, write
 from reports.pictures.galleries import leading
-from reports.pictures.style import figure, look, plain_log, wrapped
+from reports.pictures.style import DARK_INK, DARK_PAPER, darken, figure, look, plain_log, wrapped
 
 from ..conftest import HAND, NEFERTITI, Writer, flat, sheet
 
@@ -68,7 +72,8 @@ def test_a_large_report_has_no_figure_for_each_model_and_those_of_before_go(
     draw(small, tmp_path, tmp_path, 1)
     assert (tmp_path / f"{gone.name}.png").exists()
     draw(large, tmp_path, tmp_path, 1)
-    assert sorted(file.name for file in tmp_path.glob("*.p*")) == ["pareto.pdf", "pareto.png"]
+    names = sorted(file.name for file in tmp_path.glob("*.p*"))
+    assert names == ["pareto-dark.png", "pareto.pdf", "pareto.png"]
 
 
 def test_the_same_results_give_the_same_bytes(suite, tmp_path):
@@ -219,3 +224,89 @@ def test_names_are_parted_at_spaces_hyphens_and_underscores():
     assert wrapped("SLIM symmetric Dirichlet", 15) == "SLIM symmetric\nDirichlet"
     assert wrapped("nefertiti-lowres_odedstein", 20) == "nefertiti-lowres_\nodedstein"
     assert wrapped("beetle", 3) == "beetle"
+
+
+def trade_off_table(**rows):
+    """Area, angle and fitness by method."""
+    return pd.DataFrame.from_dict(rows, orient="index", columns=[AREA, ANGLE, "fit"])
+
+
+def test_no_broken_map_is_on_the_pareto_front(suite):
+    points = trade_off_table(
+        broken=(0.0, 0.0, False), a=(0.1, 0.5, True), b=(0.2, 0.2, True), worse=(0.3, 0.3, True),
+        equal=(0.1, 0.6, True), c=(0.9, 0.1, True),
+    )  # fmt: skip
+    front = plots.pareto_front(suite, points)
+    np.testing.assert_array_equal(front, [[0.1, 0.5], [0.2, 0.2], [0.9, 0.1]])
+    assert len(plots.pareto_front(suite, points[~points["fit"]])) == 0
+
+
+def test_a_map_that_may_not_be_ranked_is_not_fit(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for method in ("lscm", "arap", "slim"):
+            writer.cell(HAND, sheet(), method, {}, result=flat(sheet(), 0.3))
+    made = contents(tmp_path)[0]
+    for short, grade, angle in (("LSCM", "collapsed", 0.3), ("ARAP", "broken", 1e-9)):
+        made.means.loc[made.means["label"] == short, ["grade", ANGLE]] = grade, angle
+    found = plots.trade_offs(made, HAND)
+    assert found["fit"].to_dict() == {"LSCM": False, "ARAP": False, "SLIM": True}
+    assert found.loc["ARAP", ANGLE] == plots.LEAST_ANGLE
+
+
+@pytest.mark.parametrize(("sizes", "lines"), [(4, 0), (5, 1)])
+def test_a_power_law_goes_through_five_sizes_or_more(tmp_path, sizes, lines):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for count in range(3, 3 + sizes):
+            for twin in "ab":  # two models of each size
+                mesh = sheet(count)
+                writer.cell(f"{twin}{count}", mesh, "lscm", {}, result=flat(mesh), seconds=count)
+    (place,) = plots.cost(contents(tmp_path)[0]).axes
+    assert sum(line.get_linestyle() != "None" for line in place.lines) == lines
+
+
+def test_all_panels_end_alike(suite):
+    places = plots.pareto(suite, suite.cases).axes
+    assert len(places) > 1
+    assert len({(*place.get_xlim(), *place.get_ylim()) for place in places}) == 1
+
+
+def test_a_figure_for_dark_pages_turns_greys_and_keeps_colours(tmp_path):
+    made = figure(2, 1)
+    place = made.add_axes((0.2, 0.2, 0.7, 0.7))
+    place.plot([0, 1], [0, 1], color="#0072B2")
+    text = place.set_title("black", color="black")
+    shown = place.scatter([0, 1], [0, 1], c=[[1, 1, 1, 1], [0, 0, 0, 0.5]])
+    darken(made)
+    assert to_hex(text.get_color()) == DARK_INK
+    assert to_hex(place.get_facecolor()) == DARK_PAPER  # white
+    assert place.lines[0].get_color() in {"#0072B2", to_rgba("#0072B2")}
+    np.testing.assert_allclose(shown.get_facecolor()[0], to_rgba(DARK_PAPER))
+    np.testing.assert_allclose(shown.get_facecolor()[1], to_rgba(DARK_INK, 0.5))
+    figures.few_colours(made, DARK_PAPER, tmp_path / "dark.png")
+    with Images.open(tmp_path / "dark.png") as image:
+        assert image.convert("RGB").getpixel((0, 0)) == (0x1D, 0x20, 0x25)
+
+
+def test_the_palette_of_dark_figures_is_that_of_the_style_sheet():
+    style = resources.files("reports.page").joinpath("templates/style.css").read_text()
+    dark = style[style.index("prefers-color-scheme: dark") :]
+    assert f"--card: {DARK_PAPER}" in dark
+    assert f"--tile: {DARK_PAPER}" in dark
+    assert f"--ink: {DARK_INK}" in dark
+
+
+def test_the_caption_of_the_clouds_says_what_was_done(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for case, points in (("one", 500), ("two", 2048)):
+            params = {"preset": "paper", "points": 2048, "iterations": 300}
+            report = {"points": points}
+            writer.cell(case, sheet(), "parapoint", params, result=flat(sheet()), report=report)
+    made = contents(tmp_path)[0]
+    assert figures.points_told(made) == "500 to 2,048; paper, 300 iterations"
+    (caption,) = [one.caption for one in drawings(made, tmp_path) if one.name == "clouds"]
+    assert "500 to 2,048" in caption
+    assert "10,000" not in caption
+    assert "cloud itself" not in caption  # there is none here

@@ -19,8 +19,8 @@ def test_latex_escapes_everything_that_latex_reads():
     assert latex_text("a_b & 50% #1 {x} ~^\\ $") == (
         r"a\_b \& 50\% \#1 \{x\} \textasciitilde{}\textasciicircum{}\textbackslash{} \$"
     )
-    assert latex_text("2.5·10^7") == r"2.5$\cdot 10^{7}$"
-    assert latex_text("1.0·10^−3 ∞ ↓") == r"1.0$\cdot 10^{-3}$ $\infty$ $\downarrow$"
+    assert latex_text("2.5·10⁷") == r"2.5$\cdot 10^{7}$"
+    assert latex_text("1.0·10⁻³ ∞ ↓") == r"1.0$\cdot 10^{-3}$ $\infty$ $\downarrow$"
     assert latex_text("数\x00") == "??"
 
 
@@ -89,7 +89,7 @@ def test_latex_compiles(results, tmp_path):
 def test_markdown_marks_and_escapes():
     text = markdown(table({"name": "a|b", "a": 0.1, "b": 0.1}, {"name": "a|b", "a": 0.2, "b": 0.2}))
     lines = [line for line in text.splitlines() if line.startswith("|")]
-    assert lines[0] == "| Name | G: A ↓ | G: B ↑ | C |"
+    assert lines[0] == "| Name | G: A ↓ | G: B % ↑ | C |"
     assert lines[2] == "| a\\|b | **0.10** | *10.0* | – |"
     assert lines[3] == "|  | *0.20* | **20.0** | – |"
     assert "C\\_1" in text

@@ -3,13 +3,16 @@ import json
 import pytest
 
 from reports.contents import (
+    AREA,
     POINT_ANGLE,
     POINT_AREA,
     POINT_COLLISIONS,
     POINT_TEARS,
     contents,
 )
-from reports.tables.leaderboard import SHOWN, data, definition, glances, winner
+from reports.page.board import data
+from reports.tables.leaderboard import SHOWN, definition, glances, winner
+from reports.tables.suites import comparison
 
 from ..conftest import DEVIL, HAND, HOSTILE, NEFERTITI, Writer, flat, sheet
 
@@ -30,9 +33,9 @@ def test_the_winner_is_the_best_by_the_metric_s_direction(suite):
 
 @pytest.mark.parametrize(
     ("second", "names"),
-    [(1.0, ("LSCM", "ARAP")), (1.004, ("LSCM", "ARAP")), (1.02, ("LSCM",)), (0.98, ("ARAP",))],
+    [(1.0, ("LSCM", "ARAP")), (1.04, ("LSCM", "ARAP")), (1.07, ("LSCM",)), (0.93, ("ARAP",))],
 )
-def test_equal_to_three_digits_is_equal(tmp_path, second, names):
+def test_times_within_a_twentieth_are_equal(tmp_path, second, names):
     writer = Writer(tmp_path)
     with writer.store.writing():
         for method, seconds in (("lscm", 1.0), ("arap", second)):
@@ -56,17 +59,57 @@ def test_the_cells_are_json_with_every_metric(suite):
     names = [metric["name"] for metric in given["metrics"]]
     assert given["shown"] == [name for name in SHOWN if name in names]
     assert set(SHOWN).difference(names) == {POINT_ANGLE, POINT_AREA, POINT_COLLISIONS, POINT_TEARS}
-    assert names[-1] == "seconds"
+    assert names[-2:] == ["seconds", "cpu_seconds"]
     (only,) = given["suites"]
     assert [model["name"] for model in only["models"]] == [HAND, DEVIL, NEFERTITI]
     assert len(only["cells"]) == len(suite.rows)
-    assert all(len(cell["values"]) == len(names) for cell in only["cells"])
+    assert all(len(cell["entries"]) == len(names) for cell in only["cells"])
     hostile = next(cell for cell in only["cells"] if cell["status"] == "timeout")
     assert only["methods"][hostile["method"]]["name"] == HOSTILE
-    assert hostile["values"][0] is None
+    assert hostile["entries"][0] == ["–", None, ""]
     measured = suite.measured.set_index("id").loc[suite.rows[0].id, "angle_difference_mean"]
     at = names.index("angle_difference_mean")
-    assert only["cells"][0]["values"][at] == pytest.approx(measured, rel=1e-4)
+    assert only["cells"][0]["entries"][at][1] == pytest.approx(measured, rel=1e-4)
+
+
+def test_the_page_shows_what_was_ranked_here(tmp_path):
+    """Three methods with known values: the page has the marks and statistics of the tables."""
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for case in "abc":
+            for method in ("lscm", "arap", "tutte"):
+                writer.cell(case, sheet(), method, {}, result=flat(sheet()))
+    made = contents(tmp_path)[0]
+    means = made.means
+    known = {"LSCM": [0.1, 0.2, 0.9], "ARAP": [0.2, 0.3, 0.4], "Tutte": [0.01, 0.01, 0.01]}
+    for short, values in known.items():
+        means.loc[means["label"] == short, AREA] = values
+    means.loc[means["label"] == "Tutte", "grade"] = "broken"
+    given = data([made])
+    at = [metric["name"] for metric in given["metrics"]].index(AREA)
+    (only,) = given["suites"]
+    order = [method["name"] for method in only["methods"]]
+
+    def shown(entries):
+        return {name: own[at] for name, own in zip(order, entries, strict=True)}
+
+    for over in ("common", "own"):
+        assert shown(only["summaries"]["mean"][over]) == {
+            "Tutte": ("0.010", 0.01, ""),  # broken: shown, and never best
+            "LSCM": ("0.400", 0.4, "second"),
+            "ARAP": ("0.300", 0.3, "best"),
+        }
+        medians = shown(only["summaries"]["median"][over])
+        assert (medians["LSCM"][1:], medians["ARAP"][1:]) == ((0.2, "best"), (0.3, "second"))
+        worst = shown(only["summaries"]["worst"][over])
+        assert (worst["LSCM"][1:], worst["ARAP"][1:]) == ((0.9, "second"), (0.4, "best"))
+    first = shown([one["entries"] for one in only["models"][0]["maps"]])
+    assert [first[name][2] for name in ("Tutte", "LSCM", "ARAP")] == ["", "best", "second"]
+    assert winner(made, "a", AREA).names == ("LSCM",)
+    rows = comparison(made, [AREA])
+    marks = {cells[1].text: [cell.mark for cell in cells[2:6]] for cells in rows.cells[0]}
+    assert marks["Tutte"] == [""] * 4
+    assert marks["LSCM"] == ["second", "best", "second", "second"]
 
 
 def test_a_definition_names_unit_weighting_and_source():

@@ -1,6 +1,9 @@
+import math
+
 import pytest
 
 from reports.contents import contents
+from reports.tables.formats import comma_separated
 from reports.tables.suites import comparison, conformality, failures, supplement
 
 from ..conftest import DEVIL, HAND, HOSTILE, NEFERTITI, Writer, flat, sheet
@@ -51,19 +54,19 @@ def test_comparison_counts_and_common_means(results):
     assert ours["common"] == pytest.approx(values.iloc[:2].mean())
     assert rows[HOSTILE]["mean"] is None
     assert f"2: {HAND}, {DEVIL}" in made.caption
-    assert [column.head for column in made.columns[2:6]] == [
-        *("mean ↓", "median ↓", "worst ↓", "common mean ↓"),
-    ]
+    heads = [column.head for column in made.columns[2:6]]
+    assert heads == ["mean", "median", "worst", "common mean"]  # the arrow stands at the metric
+    assert made.cells[0][0][0].text == "angle difference, mean [radians] ↓"
 
 
 @pytest.mark.parametrize(
-    ("name", "better", "worst", "marks"),
+    ("name", "arrow", "worst", "marks"),
     [
-        ("seconds", "lower", 9.0, ["best", "second"]),
-        ("packing_efficiency", "higher", 1.0, ["second", "best"]),
+        ("seconds", "↓", 9.0, ["best", "second"]),
+        ("packing_efficiency", "↑", 1.0, ["second", "best"]),
     ],
 )
-def test_comparison_by_hand(tmp_path, name, better, worst, marks):
+def test_comparison_by_hand(tmp_path, name, arrow, worst, marks):
     writer = Writer(tmp_path)
     with writer.store.writing():
         for case in "abc":
@@ -75,7 +78,7 @@ def test_comparison_by_hand(tmp_path, name, better, worst, marks):
     made = comparison(suite, [name])
     (block,) = made.blocks
     rows = {row["label"]: row for row in block}
-    assert rows["LSCM"]["better"] == better
+    assert made.cells[0][0][0].text.endswith(f" {arrow}")
     lscm, arap = rows["LSCM"], rows["ARAP"]
     assert (lscm["mean"], lscm["median"], lscm["worst"]) == (4, 2, worst)
     assert (arap["mean"], arap["median"], arap["common"]) == (5.5, 5.5, 5.5)
@@ -88,3 +91,38 @@ def test_failures_are_told_with_status_and_reason(results):
     made = failures(contents(results)[0])
     told = {row["status"]: row["reason"] for row in made.blocks[0]}
     assert told == {"skipped": f"needs a disk {HOSTILE}", "timeout": "over 10 s"}
+
+
+def test_a_common_mean_needs_every_common_model_and_a_cloud_has_no_angles(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for case in "abc":
+            for method in ("lscm", "arap"):
+                writer.cell(case, sheet(), method, {}, result=flat(sheet()))
+    suite = contents(tmp_path)[0]
+    means = suite.means
+    means.loc[means["case"] == "c", "stretch_l2"] = math.nan  # defined on a and b alone
+    means.loc[means["case"] != "c", "stretch_l2"] = [1.0, 2.0, 3.0, 5.0]
+    made = comparison(suite, ["stretch_l2"])
+    assert [row["common"] for row in made.blocks[0]] == [2.0, 3.5]
+    assert "Not defined on all models: L2 stretch on 2." in made.notes
+    again = contents(tmp_path)[0]
+    means = again.means
+    means["stretch_l2"] = [1.0, 2.0, 3.0, 4.0, 5.0, math.nan]  # ARAP has none on c
+    rows = {row["label"]: row for row in comparison(again, ["stretch_l2"]).blocks[0]}
+    assert rows["LSCM"]["common"] == 3
+    assert rows["ARAP"]["common"] is None
+    assert rows["ARAP"]["mean"] == 3
+
+
+def test_fractions_are_per_cent_in_the_comparison_and_so_in_its_csv(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for method in ("lscm", "arap"):
+            writer.cell("a", sheet(), method, {}, result=flat(sheet()))
+    suite = contents(tmp_path)[0]
+    suite.means["flipped_fraction"] = [0.0125, 0.5]
+    made = comparison(suite, ["flipped_fraction"])
+    assert made.cells[0][0][0].text == "flipped faces % ↓"
+    assert made.cells[0][0][2].text == "1.25"
+    assert comma_separated(made).splitlines()[1].split(",")[2] == "1.25"

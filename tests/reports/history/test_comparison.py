@@ -5,11 +5,13 @@ import pytest
 
 from parapoint import console
 from parapoint.errors import InputError
-from reports import history
 from reports.__main__ import main
-from reports.history import Comparison, alone, ended, moved, said, summary, welch
+from reports.history import pages
+from reports.history.comparison import Comparison, welch
+from reports.history.pages import said
+from reports.history.tables import alone, ended, moved, summary
 
-from .conftest import DEVIL, HAND, HOSTILE, SLIM, Writer, flat, sheet
+from ..conftest import DEVIL, HAND, HOSTILE, SLIM, Writer, flat, sheet
 
 MACHINE = {"commit": "0123456789abcdef", "cpu": "A", "cores": 2, "gpu": [], "python": "3.11"}
 
@@ -168,9 +170,9 @@ def test_the_command_writes_a_page_for_each_folder_and_says_what_moved(tmp_path,
 def test_a_comparison_needs_two_folders_with_results(tmp_path):
     one = folder(tmp_path / "one", (HAND, "slim", [0.3], {}))
     with pytest.raises(InputError, match="not compared with itself"):
-        history.write(one, [one / ".." / "one"])
+        pages.write(one, [one / ".." / "one"])
     with pytest.raises(InputError, match="no such folder"):
-        history.write(one, [tmp_path / "nowhere"])
+        pages.write(one, [tmp_path / "nowhere"])
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match="holds no results"):
-        history.write(one, [tmp_path / "empty"])
+        pages.write(one, [tmp_path / "empty"])

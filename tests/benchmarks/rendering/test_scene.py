@@ -2,9 +2,13 @@ import igl
 import numpy as np
 import pytest
 
+from benchmarks.rendering import scene as scenes
+from benchmarks.rendering.camera import camera
+from benchmarks.rendering.colours import CLAY, DARK_TONE, LIGHT_TONE, linear
+from benchmarks.rendering.rays import Rays
+from benchmarks.rendering.scene import Scene, split
+from benchmarks.rendering.viewpoints import two_cameras, upright
 from parapoint.surfaces.surface import Mesh
-from reports.pictures import render
-from reports.pictures.render import Rays, Scene, camera, linear, split, two_cameras, upright
 
 Z, Y = np.eye(3)[2], np.eye(3)[1]
 
@@ -47,7 +51,7 @@ def test_a_fine_checkerboard_is_its_mean_without_noise():
     mesh = square()
     view = Scene(mesh, shadows=False).view(camera(mesh, Z, Y, margin=1.0), 32)
     tones = view.checker(uv_of(mesh), 32 * 100 + 0.37)
-    mean = (render.LIGHT_TONE + render.DARK_TONE) / 2
+    mean = (LIGHT_TONE + DARK_TONE) / 2
     np.testing.assert_allclose(tones, np.broadcast_to(mean, tones.shape), atol=0.01)
 
 
@@ -116,7 +120,7 @@ def test_coarse_and_split_faces_are_seen_alike(monkeypatch):
     mesh = square()
     at = camera(mesh, Z, Y)
     coarse = Scene(mesh).view(at, 40)
-    monkeypatch.setattr(render, "FINE_FACES", 500)
+    monkeypatch.setattr(scenes, "FINE_FACES", 500)
     fine = Scene(mesh).view(at, 40)
     assert len(fine.scene.fine.parent) == 512
     board = [view.image(view.checker(uv_of(mesh), 3), lit=False) for view in (coarse, fine)]
@@ -159,7 +163,7 @@ def test_the_same_input_gives_the_same_bytes():
     for _ in range(2):
         scene = Scene(icosphere())
         view = scene.view(two_cameras(scene)[0], 60)
-        images.append(view.image(np.broadcast_to(render.CLAY, (len(view.face), 3))))
+        images.append(view.image(np.broadcast_to(CLAY, (len(view.face), 3))))
     assert images[0].tobytes() == images[1].tobytes()
 
 

@@ -1,4 +1,4 @@
-"""A headless renderer: rays by embree, shading in numpy; the same input gives the same bytes.
+"""A scene and its views: shading in numpy on rays that `Rays` follows; no screen is needed.
 
 What does not depend on a map (visibility, normals, ambient occlusion, light) is kept in a `Scene`
 and its `View`s, so that a further map of the same model costs a lookup of its texture only. Cameras
@@ -10,21 +10,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import igl
 import numpy as np
-import numpy.typing as npt
-from scipy import sparse
-from scipy.spatial import cKDTree
 
-from parapoint.surfaces.frame import Frame
+from benchmarks.rendering.camera import Camera
+from benchmarks.rendering.colours import DARK_TONE, LIGHT_TONE, Floats, Image, averaged
+from benchmarks.rendering.rays import Rays, sphere_directions
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
-
-Image = npt.NDArray[np.uint8]
-"""(height, width, 4) RGBA in sRGB, alpha not premultiplied."""
-
-Floats = npt.NDArray[np.float32]
 
 CREASE_DEGREES = 50.0
 """Faces that meet at a larger angle are shaded with an edge between them."""
@@ -36,123 +30,9 @@ FINE_FACES = 20_000
 """Ambient occlusion is computed on at least this many faces."""
 
 KEY_LIGHT = np.array([-0.42, 0.56, 0.71], dtype=np.float32)
+
 FILL_LIGHT = np.array([0.80, 0.10, 0.59], dtype=np.float32)
 """Directions of the lights in the frame of the camera: right, up, towards the eye."""
-
-RING = 48
-"""Directions around the upright axis that are tried for a view."""
-
-THREE_QUARTERS = 5
-"""Steps of the ring by which a front is turned for its view at three quarters (37 degrees)."""
-
-TILT = 0.30
-"""The camera looks down by the angle of this slope."""
-
-
-def linear(srgb: npt.ArrayLike) -> Floats:
-    """Linear light, float32, of sRGB values in [0, 1]: what pictures are computed in."""
-    values = np.asarray(srgb, dtype=np.float64)
-    found = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
-    return np.asarray(found, dtype=np.float32)
-
-
-LIGHT_TONE, DARK_TONE = linear([0.93, 0.92, 0.89]), linear([0.16, 0.38, 0.64])
-"""The two tones of the checkerboard."""
-
-SEAM_GREEN, FLIP_ORANGE = linear([0.0, 0.72, 0.22]), linear([0.84, 0.37, 0.0])
-CLAY, INK = linear([0.80, 0.79, 0.77]), linear([0.10, 0.10, 0.12])
-
-
-@dataclass(frozen=True, eq=False)
-class Camera:
-    """An orthographic camera.
-
-    Attributes:
-        axes: (3, 3) rows: right, up, and from the surface to the eye.
-        centre: (3,) the point in the middle of the image.
-        half: (2,) half of the width and of the height of the image, in units of the surface.
-    """
-
-    axes: FloatArray
-    centre: FloatArray
-    half: FloatArray
-
-    def screen(self, points: FloatArray) -> FloatArray:
-        """(n, 3) right, up and towards the eye, of (n, 3) points, about the centre."""
-        return np.asarray((points - self.centre) @ self.axes.T, dtype=np.float64)
-
-
-def camera(mesh: Mesh, toward: FloatArray, up: FloatArray, margin: float = 1.04) -> Camera:
-    """The camera that looks along -`toward` (3,), `up` (3,) upright, with all of the mesh in it."""
-    back = toward / np.linalg.norm(toward)
-    right = np.cross(up, back)
-    right = right / np.linalg.norm(right)
-    axes = np.stack([right, np.cross(back, right), back])
-    seen = mesh.vertices[mesh.referenced] @ axes.T
-    low, high = seen.min(axis=0), seen.max(axis=0)
-    half = np.maximum((high - low)[:2] / 2, (high - low).max() / 8) * margin
-    return Camera(axes=axes, centre=(low + high) / 2 @ axes, half=half)
-
-
-class Rays:
-    """Ray queries against a mesh: embree where its wheel exists, else libigl's tree."""
-
-    def __init__(self, mesh: Mesh, *, embree: bool = True) -> None:
-        self._mesh = mesh
-        self._frame = Frame.of(mesh.vertices)  # embree works in single precision
-        self._scene: Any = None
-        self._tree: Any = None
-        if embree:
-            try:
-                from embreex.mesh_construction import TriangleMesh
-                from embreex.rtcore_scene import EmbreeScene
-            except ImportError:  # no wheel for this machine
-                pass
-            else:
-                self._scene = EmbreeScene()
-                TriangleMesh(
-                    self._scene,
-                    self._frame.inside(mesh.vertices).astype(np.float32),
-                    mesh.faces.astype(np.int32),
-                )
-        if self._scene is None:
-            self._tree = igl.AABB()
-            self._tree.init(mesh.vertices, mesh.faces)
-
-    def _near(self, origins: FloatArray) -> Floats:
-        return self._frame.inside(origins).astype(np.float32)
-
-    def first(self, origins: FloatArray, directions: Floats) -> tuple[IntArray, Floats]:
-        """(n,) the face that each ray meets first, -1 for none; (n, 2) weights of corners 1, 2."""
-        if self._scene is not None:
-            hit = self._scene.run(self._near(origins), directions, query="INTERSECT", output=True)
-            return hit["primID"].astype(np.int64), np.stack([hit["u"], hit["v"]], axis=1)
-        face, _, weights = self._tree.intersect_ray_first(
-            self._mesh.vertices,
-            self._mesh.faces,
-            origins,
-            directions.astype(np.float64),
-            np.inf,
-        )
-        # What a ray that meets nothing leaves behind is no number.
-        known = np.where(face[:, None] >= 0, weights[:, -2:], 0)
-        return face, known.astype(np.float32)
-
-    def blocked(self, origins: FloatArray, directions: Floats) -> BoolArray:
-        """(n,) whether each ray meets the surface."""
-        if self._scene is not None:
-            found = self._scene.run(self._near(origins), directions, query="OCCLUDED")
-            return np.asarray(found >= 0)
-        return np.asarray(self.first(origins, directions)[0] >= 0)
-
-
-def sphere_directions(count: int) -> FloatArray:
-    """(count, 3) unit directions, spread evenly (a Fibonacci spiral)."""
-    k = np.arange(count) + 0.5
-    z = 1 - 2 * k / count
-    angle = np.pi * (1 + 5**0.5) * k
-    radius = np.sqrt(1 - z**2)
-    return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
 
 
 def _unit(vectors: FloatArray) -> FloatArray:
@@ -453,128 +333,6 @@ class View:
         return marked[self.sample]
 
 
-def averaged(shape: tuple[int, int], samples: int, sample: IntArray, colours: Floats) -> Image:
-    """The picture of (height, width) pixels whose samples have linear `colours` (S, 3).
-
-    `sample` (S,) is the place of each in the grid of `samples` by `samples` a pixel; what it does
-    not name is clear.
-    """
-    height, width = shape
-    grid = np.zeros((height * samples * width * samples, 4), dtype=np.float32)
-    grid[sample, :3] = np.minimum(colours, 1)
-    grid[sample, 3] = 1
-    blocks = grid.reshape(height, samples, width, samples, 4)
-    pixels = np.zeros((height, width, 4), dtype=np.float32)
-    for row in range(samples):
-        for column in range(samples):
-            pixels += blocks[:, row, :, column]
-    pixels /= samples**2
-    cover = pixels[..., 3:]
-    pixels[..., :3] /= np.where(cover > 0, cover, 1)
-    levels = np.round(255 * np.concatenate([_srgb(pixels[..., :3]), cover], axis=2))
-    return np.asarray(levels, dtype=np.uint8)
-
-
 def _wave_integral(x: Floats) -> Floats:
     """The integral of the square wave that is 1 on [0, 1) and -1 on [1, 2), from 0."""
     return np.asarray(1 - np.abs(np.mod(x, 2) - 1), dtype=np.float32)
-
-
-def _srgb(linear: Floats) -> Floats:
-    """SRGB values of linear light in [0, 1]."""
-    return np.asarray(
-        np.where(
-            linear <= 0.0031308,
-            linear * 12.92,
-            1.055 * np.maximum(linear, 1e-9) ** (1 / 2.4) - 0.055,
-        )
-    )
-
-
-def two_cameras(scene: Scene) -> tuple[Camera, Camera]:
-    """Two views that show the shape: its front at three quarters, and what that leaves unseen.
-
-    The front is the direction around the upright axis with most to see: visible surface, weighted
-    by how much it turns there (faces, fingers, horns over flat backs). On a mirror-symmetric shape
-    it is the more detailed of the two directions within the plane of symmetry, and the view is
-    turned off it. The second view shows as much as possible of what the first does not.
-    """
-    mesh = scene.mesh
-    up = upright(mesh)
-    level = np.eye(3)[(np.abs(up).argmax() + 1) % 3]
-    azimuth = np.arange(RING) * 2 * np.pi / RING
-    ring = np.cos(azimuth)[:, None] * level + np.sin(azimuth)[:, None] * np.cross(up, level)
-    cameras = [camera(mesh, direction + TILT * up, up) for direction in ring]
-    area = np.maximum(mesh.face_areas, 1e-30)
-    shown = np.stack([scene.view(at, 96, 1).shown_areas for at in cameras])
-    side = int(np.argmax(shown.sum(axis=(0, 2))))  # the outer one, however the faces are turned
-    seen = np.minimum(shown[:, side] / area, 1)
-    turning = area * _turning(scene)
-    gain, detail = seen @ (area + 2 * turning), seen @ turning
-    mirror = _mirror(scene, ring[: RING // 2])
-    if mirror is None:
-        first = int(np.argmax(gain))
-    else:
-        ends = [(mirror + RING // 4) % RING, (mirror + 3 * RING // 4) % RING]
-        front = max(ends, key=lambda end: float(detail[end]))
-        turned = [(front + step) % RING for step in (-THREE_QUARTERS, THREE_QUARTERS)]
-        first = max(turned, key=lambda at: float(gain[at]))
-    second = int(np.argmax(np.maximum(seen - seen[first], 0) @ area))
-    return cameras[first], cameras[second]
-
-
-def _mirror(scene: Scene, normals: FloatArray) -> int | None:
-    """The row of `normals` (n, 3) of the plane in which the surface mirrors itself, if any."""
-    mesh = scene.mesh
-    centres = mesh.vertices[mesh.faces].mean(axis=1)
-    middle = np.average(centres, axis=0, weights=np.maximum(mesh.face_areas, 1e-30))
-    tree = cKDTree(centres)
-    stride = max(1, len(centres) // 1000)
-    some = centres[::stride] - middle
-    weights = np.maximum(mesh.face_areas[::stride], 1e-30)
-    misfit = []
-    for normal in normals:
-        distance, _ = tree.query(some - 2 * (some @ normal)[:, None] * normal + middle)
-        misfit.append(float(np.average(distance, weights=weights)))
-    spacing = np.sqrt(mesh.face_areas.sum() / len(mesh.faces))
-    best = int(np.argmin(misfit))
-    return best if misfit[best] < spacing + 0.02 * scene.size else None
-
-
-def _turning(scene: Scene) -> FloatArray:
-    """(F,) how much the surface turns around each face: 0 if flat, 1 in the strongest twentieth."""
-    mesh = scene.mesh
-    spread = 1 - np.einsum("fki,fi->fk", scene.corner_normals, scene.face_normals).min(axis=1)
-    face = np.repeat(np.arange(len(mesh.faces)), 3)
-    at = sparse.csr_matrix((np.ones(len(face)), (face, mesh.faces.reshape(-1))))
-    near = at @ at.T
-    smooth = near @ (spread * mesh.face_areas) / np.maximum(near @ mesh.face_areas, 1e-30)
-    return np.asarray(np.minimum(smooth / max(float(np.quantile(smooth, 0.95)), 1e-12), 1))
-
-
-def upright(mesh: Mesh) -> FloatArray:
-    """(3,) the axis direction that points up.
-
-    A surface with a large opening (a bust's neck, a glove, the floor of a car) stands on it. A
-    closed one with a flat base stands on that. Else y points up, as modelling programs have it.
-    """
-    axes = np.concatenate([np.eye(3), -np.eye(3)])
-    if mesh.boundary_loops:
-        loop = mesh.vertices[mesh.boundary_loops[0]]
-        middle = loop.mean(axis=0)
-        area = np.cross(loop - middle, np.roll(loop, -1, axis=0) - middle).sum(axis=0) / 2
-        surface = (mesh.face_areas[:, None] * mesh.vertices[mesh.faces].mean(axis=1)).sum(axis=0)
-        away = surface / max(float(mesh.face_areas.sum()), 1e-30) - middle
-        area = area * np.sign(area @ away)
-        if np.linalg.norm(area) > 0.01 * mesh.face_areas.sum():
-            return np.asarray(axes[np.argmax(axes @ area)])
-    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
-    normals = np.cross(b - a, c - a) / 2
-    heights = mesh.vertices[mesh.faces].mean(axis=1) @ axes.T
-    floor = heights.min(axis=0) + 0.02 * np.ptp(heights, axis=0)
-    down = -(normals @ axes.T)
-    flat = (down > 0.98 * mesh.face_areas[:, None]) & (heights < floor)
-    base = (down * flat).sum(axis=0)
-    if base.max() > 0.03 * mesh.face_areas.sum():
-        return np.asarray(axes[np.argmax(base)])
-    return np.asarray(axes[1])

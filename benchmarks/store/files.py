@@ -1,0 +1,149 @@
+"""The npz files of a results folder: surfaces, the maps they came with, and the maps of cells.
+
+The name of a file is a hash of its content, or the id of a row; no other text becomes a path.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+from benchmarks.store.archives import (
+    HASH,
+    arrays_hash,
+    disk_said,
+    map_arrays,
+    read_map,
+    read_surface,
+    replacing,
+    surface_arrays,
+    sync_folder,
+    write_arrays,
+)
+from benchmarks.store.rows import ResultRow
+from parapoint.errors import InputError
+from parapoint.surfaces.parameterization import Parameterization, PointParameterization
+from parapoint.surfaces.surface import PointCloud, Surface
+
+
+class Files:
+    """The npz files in a results folder.
+
+    Attributes:
+        folder: the results folder.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def surface_path(self, surface_hash: str) -> Path:
+        """Where the surface with that hash lies."""
+        return self.folder / "surfaces" / f"{surface_hash}.npz"
+
+    def reference_path(self, surface_hash: str) -> Path:
+        """Where the map lies that the model of that surface came with."""
+        return self.folder / "references" / f"{surface_hash}.npz"
+
+    def exact_path(self, surface_hash: str) -> Path:
+        """Where the points without noise lie of the noisy cloud with that hash."""
+        return self.folder / "exact" / f"{surface_hash}.npz"
+
+    def scored_path(self, surface_hash: str) -> Path:
+        """Where the surface lies that maps are scored on: without noise, if that is stored."""
+        exact = self.exact_path(surface_hash)
+        return exact if exact.exists() else self.surface_path(surface_hash)
+
+    def uv_path(self, row_id: str) -> Path:
+        """Where the map of the row with that id lies."""
+        return self.folder / "uv" / f"{row_id}.npz"
+
+    def surface(self, row: ResultRow) -> Surface:
+        """The surface of a row as it was loaded, before any preprocessing.
+
+        Raises:
+            InputError: the row has none, or its file is missing or damaged.
+        """
+        if not row.surface_hash:
+            raise InputError(f"{row.case}: no surface is stored ({row.reason})")
+        return read_surface(self.surface_path(row.surface_hash))
+
+    def result(self, row: ResultRow) -> Parameterization | PointParameterization:
+        """The map of a row that ended ok, with its trace and report.
+
+        Raises:
+            InputError: the row has none, or its file is missing or damaged.
+        """
+        if not row.uv_sha256:
+            raise InputError(f"{row.case}, {row.method}: no map is stored ({row.status})")
+        return read_map(self.uv_path(row.id), row.report)
+
+    def reference(self, row: ResultRow) -> Parameterization | None:
+        """The map that the row's model came with; None if it came with none.
+
+        Raises:
+            InputError: its file is damaged.
+        """
+        path = self.reference_path(row.surface_hash)
+        reference = read_map(path) if row.surface_hash and path.exists() else None
+        return reference if isinstance(reference, Parameterization) else None
+
+    def add_surface(self, surface: Surface) -> str:
+        """Store a surface unless it is there already; its hash.
+
+        Raises:
+            InputError: the disk is full, here and in the methods below.
+        """
+        arrays = surface_arrays(surface)
+        name = arrays_hash(arrays)[:32]
+        path = self.surface_path(name)
+        with disk_said(path):
+            if not path.exists():
+                write_arrays(path, arrays)
+        return name
+
+    def add_reference(self, surface_hash: str, reference: Parameterization) -> None:
+        """Store the map that a surface came with, unless it is there already."""
+        path = self.reference_path(surface_hash)
+        with disk_said(path):
+            if not path.exists():
+                write_arrays(path, map_arrays(reference))
+
+    def add_exact(self, surface_hash: str, cloud: PointCloud) -> None:
+        """Store the points of a noisy cloud without their noise, unless they are there already."""
+        path = self.exact_path(surface_hash)
+        with disk_said(path):
+            if not path.exists():
+                write_arrays(path, surface_arrays(cloud))
+
+    def add_map(self, row_id: str, path: Path) -> None:
+        """Move the map file `path`, which lies on the same disk, to its place."""
+        target = self.uv_path(row_id)
+        with disk_said(target):
+            target.parent.mkdir(exist_ok=True)
+            path.replace(target)
+        sync_folder(target.parent)
+
+    def surface_hashes(self) -> dict[str, str]:
+        """What `note_surfaces` has kept, as far as the surfaces are still there."""
+        try:
+            known = json.loads((self.folder / "surfaces.json").read_bytes())
+        except (FileNotFoundError, ValueError, RecursionError):
+            return {}
+        return {
+            str(origin): name
+            for origin, name in (known.items() if isinstance(known, dict) else ())
+            if isinstance(name, str) and HASH.fullmatch(name) and self.surface_path(name).exists()
+        }
+
+    def note_surfaces(self, hashes: Mapping[str, str]) -> None:
+        """Keep in `surfaces.json` which model file gave which surface.
+
+        A later run need not read these models again.
+
+        Args:
+            hashes: hashes of surfaces, by a text that says what each was read from.
+        """
+        path = self.folder / "surfaces.json"
+        with disk_said(path), replacing(path) as stream:
+            stream.write(json.dumps(hashes, indent=1).encode() + b"\n")

@@ -1,0 +1,142 @@
+"""What works on which kind of surface: successes and means, kind by kind."""
+
+from __future__ import annotations
+
+from benchmarks.metrics.grades import BOUNDS
+from reports.contents import (
+    ANGLE,
+    AREA,
+    BIJECTIVE,
+    FLIPPED,
+    ISOMETRIC,
+    OVERLAPPED,
+    POINT_ANGLE,
+    POINT_AREA,
+    POINT_COLLISIONS,
+    POINT_TEARS,
+    Contents,
+    number,
+)
+from reports.means import common_cases, common_values, statistic
+from reports.tables.notes import environment_note, failure_notes, legend, method_notes
+from reports.tables.published import model
+from reports.tables.table import SHORT, Column, Table, Value, metric_column
+
+
+def kind(contents: Contents, case: str) -> str:
+    """What sort of surface a model is: its topology, or where it is from if that matters more."""
+    entry = model(case)
+    if entry is not None and entry.set in {"wild", "scans"}:
+        return {"wild": "defective", "scans": "scans"}[entry.set]
+    mesh = None if entry else contents.mesh(case)
+    topology = entry.topology if entry else mesh.topology if mesh else "not at hand"
+    known = {"disk": "disk", "sphere": "closed, genus 0"}
+    if topology.endswith("no boundary"):
+        return "closed, handles"
+    if topology.startswith("genus"):
+        return "open, holes"
+    return known.get(topology, topology)
+
+
+def kinds(contents: Contents) -> dict[str, list[str]]:
+    """The models by the kind of surface."""
+    found: dict[str, list[str]] = {}
+    for case in contents.cases:
+        found.setdefault(kind(contents, case), []).append(case)
+    return found
+
+
+def success(contents: Contents) -> Table:
+    """Methods × kinds of surface: how often each ends well, and with a map that is one to one."""
+    groups = {"all": contents.cases} | kinds(contents)
+    if len(groups) == 2:  # one kind, which is all
+        del groups["all"]
+    rows = []
+    for label in contents.methods:
+        row: dict[str, Value] = {"method": label.short, "label": label.short}
+        for name, cases in groups.items():
+            records = [contents.records.get((case, label.short)) for case in cases]
+            own = [record for record in records if record is not None]
+            row[f"{name} ok"] = _share(sum(record["ok"] > 0 for record in own), len(own))
+            bijective = sum(number(record, BIJECTIVE) == 1 for record in own)
+            row[f"{name} {BIJECTIVE}"] = _share(bijective, len(own))
+            usable = sum(record["grade"] == "usable" for record in own)
+            row[f"{name} usable"] = _share(usable, len(own))
+        rows.append(row)
+    columns = [Column("method", "Method", text=True)]
+    for name, cases in groups.items():
+        columns.append(Column(f"{name} usable", "usable", text=True, group=f"{name}: {len(cases)}"))
+        columns.append(Column(f"{name} ok", "ok", text=True, group=f"{name}: {len(cases)}"))
+        if not contents.clouds.issuperset(cases):
+            one = Column(f"{name} {BIJECTIVE}", "1 to 1", text=True, group=f"{name}: {len(cases)}")
+            columns.append(one)
+    return Table(
+        name="success",
+        title="Success by kind of surface",
+        caption=(
+            "By kind of surface (number of models): how many maps are usable, which alone is a "
+            "success; on how many models the method ended well with "
+            "at least one seed, and on how many of them its maps are one to one (no face flipped, "
+            "degenerate or over another); of those it was asked for, skipped ones included."
+        ),
+        columns=tuple(columns),
+        blocks=(tuple(rows),),
+        notes=(
+            f"Grades: {BOUNDS}.",
+            legend(contents),
+            *failure_notes(contents),
+            environment_note(contents),
+        ),
+    )
+
+
+def _share(count: int, of: int) -> str:
+    return f"{count}/{of}" if of else "not run"
+
+
+KIND_METRICS = (
+    *(ANGLE, AREA, ISOMETRIC, FLIPPED, OVERLAPPED),
+    *(POINT_ANGLE, POINT_AREA, POINT_COLLISIONS, POINT_TEARS),
+    "seconds",
+)
+"""The metrics that are told kind by kind."""
+
+
+def means_by_kind(contents: Contents) -> Table:
+    """Kinds of surface × methods: means over the models that all methods can do."""
+    names = [name for name in KIND_METRICS if contents.means[name].notna().any()]
+    blocks = []
+    for name, cases in kinds(contents).items():
+        common = common_cases(contents, cases)
+        block = []
+        for label in contents.methods:
+            found = {case: contents.records.get((case, label.short)) for case in cases}
+            own = [record for record in found.values() if record is not None]
+            row: dict[str, Value] = {
+                "kind": f"{name}: means over {len(common)} of {len(cases)}",
+                "method": label.short,
+                "label": label.short,
+                "done": _share(sum(record["ok"] > 0 for record in own), len(own)),
+            }
+            for metric in names:
+                values = common_values(contents, label, metric, common)
+                row[metric] = statistic("mean", values, metric_column(metric).better)
+            block.append(row)
+        blocks.append(tuple(block))
+    return Table(
+        name="kinds",
+        title="Means by kind of surface",
+        caption=(
+            "Means over the models of a kind on which every method that ever ends well on this "
+            "kind did, so that nobody gains by failing; ok: on how many the method ended well."
+        ),
+        columns=(
+            Column("kind", "Surface", text=True, once=True),
+            Column("method", "Method", text=True),
+            *(metric_column(name, SHORT.get(name, "")) for name in names),
+            Column("done", "ok", text=True),
+        ),
+        blocks=tuple(blocks),
+        set_apart=contents.atlases,
+        notes=(legend(contents), *method_notes(contents), environment_note(contents)),
+    )

@@ -1,0 +1,114 @@
+"""What one change does, model by model: to a parameter (ablation), or to the cut."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from parapoint.surfaces.preparation import CUT
+from reports.contents import (
+    ANGLE,
+    AREA,
+    BIJECTIVE,
+    FLIPPED,
+    ISOMETRIC,
+    OVERLAPPED,
+    SPANNING,
+    Contents,
+    number,
+)
+from reports.tables.notes import environment_note, failure_notes, legend, method_notes
+from reports.tables.table import SHORT, Column, Table, Value, metric_column
+
+
+def ablation(contents: Contents) -> Table | None:
+    """Variants of one method, model by model; None where the suite has several methods."""
+    if len(contents.methods) < 2 or len({label.method for label in contents.methods}) > 1:
+        return None
+    names = (ANGLE, AREA, ISOMETRIC, FLIPPED, OVERLAPPED, SPANNING, "seam_length", "seconds")
+    return Table(
+        name="ablation",
+        title=f"Ablation of {contents.methods[0].name}",
+        caption=(
+            "One change at a time: each variant on each model, over all faces, means over the "
+            "seeds that ended well. Low distortion with many overlapped or flipped faces is no map."
+        ),
+        columns=(
+            Column("case", "Model", text=True, once=True),
+            Column("method", "Variant", text=True),
+            *(metric_column(name, SHORT.get(name, "")) for name in names),
+            Column("done", "ok", text=True),
+        ),
+        blocks=tuple(_block(contents, case, names) for case in contents.cases),
+        notes=(legend(contents), *failure_notes(contents), environment_note(contents)),
+    )
+
+
+def _block(contents: Contents, case: str, names: Sequence[str]) -> tuple[Mapping[str, Value], ...]:
+    """The rows of a model, one a method: `names` and how many seeds ended well."""
+    rows = []
+    for label in contents.methods:
+        record = contents.records.get((case, label.short))
+        if record is None:
+            continue
+        done = f"{record['ok']}/{record['tried']}" if record["tried"] else "skipped"
+        rows.append(
+            {
+                "case": case,
+                "method": label.short,
+                "label": label.short,
+                "done": done,
+                **{name: number(record, name) for name in names},
+            }
+        )
+    return tuple(rows)
+
+
+def cuts(contents: Contents) -> Table | None:
+    """What each way of cutting costs and buys, model by model; None where nothing is cut."""
+    if all(_cut(record) in {"", "none"} for record in contents.records.values()):
+        return None
+    lengths = ("chart_count", "seam_length", "seam_excess", SPANNING)
+    wanted = (*lengths, ANGLE, AREA, ISOMETRIC, OVERLAPPED)
+    names = [name for name in wanted if name in contents.metrics]
+    blocks = []
+    for case in contents.cases:
+        block = []
+        for row in _block(contents, case, names):
+            record = contents.records[case, str(row["label"])]
+            share = number(record, BIJECTIVE)
+            bijective = "" if share is None else {0.0: "no", 1.0: "yes"}.get(share, f"{share:.0%}")
+            block.append({**row, "cut": _cut(record), BIJECTIVE: bijective})
+        blocks.append(tuple(block))
+    return Table(
+        name="cuts",
+        title="Cuts and what they buy",
+        caption=(
+            "A longer seam and more charts buy less distortion: where each method cuts, how long "
+            "(over the root of the surface's area; against the artist's, where there is one), and "
+            "what the map is then worth. A learned seam that faces span has no length: their share "
+            "stands in its place. Bijective: no flip, no overlap, no degenerate face; with "
+            "several seeds, the share of them."
+        ),
+        columns=(
+            Column("case", "Model", text=True, once=True),
+            Column("method", "Method", text=True),
+            Column("cut", "Cut", text=True),
+            *(metric_column(name, SHORT.get(name, "")) for name in names),
+            Column(BIJECTIVE, "bijective", text=True),
+            Column("done", "ok", text=True),
+        ),
+        blocks=tuple(blocks),
+        set_apart=contents.atlases.union(lengths),
+        notes=(*method_notes(contents), *failure_notes(contents), environment_note(contents)),
+    )
+
+
+def _cut(record: Mapping[str, object]) -> str:
+    """How a model was cut for, or by, a method."""
+    if not record["ok"]:
+        return ""
+    if (number(record, SPANNING) or 0) > 0:
+        return "learned"
+    if CUT in str(record["preprocessing"]):
+        return "automatic"
+    return "its own" if (number(record, "seam_length") or 0) > 0 else "none"

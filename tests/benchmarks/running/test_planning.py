@@ -1,0 +1,80 @@
+"""Which cells a run needs, from what the results folder has already."""
+
+from __future__ import annotations
+
+import pytest
+
+from benchmarks.cases import models
+from benchmarks.running import planning
+from benchmarks.store.results import Store
+from parapoint.errors import InputError
+
+
+@pytest.fixture
+def without_sphere(monkeypatch):
+    """A place where the sphere cannot be had."""
+    load = models.load
+
+    def loaded(case: str):
+        if case == "sphere":
+            raise models.MissingModelError("sphere is not at hand")
+        return load(case)
+
+    monkeypatch.setattr(models, "load", loaded)
+
+
+@pytest.mark.usefixtures("without_sphere")
+def test_a_run_is_refused_only_where_every_model_is_missing(tmp_path):
+    planning.check_readable(["sphere", "cone"], Store(tmp_path))
+    planning.check_readable([], Store(tmp_path))
+    with pytest.raises(models.MissingModelError, match="sphere is not at hand"):
+        planning.check_readable(["sphere"], Store(tmp_path))
+
+
+@pytest.mark.usefixtures("without_sphere")
+def test_a_missing_model_has_no_hash_and_a_reason(tmp_path):
+    store = Store(tmp_path)
+    with store.writing():
+        hashes, missing = planning.surfaces(store, ["sphere", "cone"])
+    assert missing == {"sphere": "sphere is not at hand"}
+    assert hashes["sphere"] == ""
+    assert store.surface_path(hashes["cone"]).exists()
+
+
+@pytest.mark.parametrize(
+    ("file", "text"),
+    [
+        ("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"),
+        ("a.ply", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"),
+    ],
+)
+def test_a_surface_is_known_again_by_content_ending_and_readers(tmp_path, file, text):
+    path = tmp_path / file
+    path.write_text(text)
+    first = planning._origin(str(path), "readers")
+    copy = path.with_name(f"b{path.suffix.upper()}")
+    copy.write_text(text)
+    assert planning._origin(str(copy), "readers") == first
+    copy.write_text(text + "\n")
+    other = tmp_path / "a.obj"
+    other.write_text(text)
+    others = [
+        planning._origin(str(copy), "readers"),
+        planning._origin(str(other), "readers"),
+        planning._origin(str(path), "other readers"),
+    ]
+    assert len({first, *others}) == 4
+
+
+def test_a_surface_that_no_one_file_decides_is_read_every_time(tmp_path):
+    (tmp_path / "a.glTF").write_text("{}")
+    for case in (str(tmp_path / "a.glTF"), "cone", "saddle@noise=0.005"):
+        assert planning._origin(case, "readers") == ""
+
+
+def test_a_file_that_is_gone_is_bad_input(tmp_path, monkeypatch):
+    path = tmp_path / "a.off"
+    monkeypatch.setattr(models, "info", lambda _: None)
+    monkeypatch.setattr(models, "is_made_in_memory", lambda _: False)
+    with pytest.raises(InputError, match=r"a\.off"):
+        planning._origin(str(path), "readers")

@@ -1,0 +1,103 @@
+"""Clouds scanned in lines and rings are mapped, up to thirty times as far apart as their points."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from parapoint import ComputedMap, InputError
+from parapoint.computed.flattening import flat_map
+from parapoint.surfaces.components import cloud_labels
+from parapoint.surfaces.frame import Frame
+from parapoint.surfaces.scan_lines import NEAREST, breadth
+from parapoint.surfaces.surface import FloatArray
+
+
+def strips(gap: float, count: int = 1000) -> FloatArray:
+    """Lines of points about 1 apart, `gap` from line to line, on a plane."""
+    lines = max(round((count / gap) ** 0.5), 4)
+    rng = np.random.default_rng(0)
+    x, y = np.meshgrid(np.arange(count // lines) * 1.0, gap * np.arange(lines))
+    x = x + rng.uniform(0, 1, (lines, 1)) + rng.normal(0, 0.05, x.shape)
+    return np.stack([x, y, 0 * x], axis=2).reshape(-1, 3)
+
+
+def terrain(gap: float) -> FloatArray:
+    """The same over hills."""
+    points = strips(gap)
+    x, y, _ = points.T / np.ptp(points[:, 0])
+    points[:, 2] = 0.04 * np.ptp(points[:, 0]) * np.sin(5 * x) * np.cos(4 * y + 1)
+    return points
+
+
+def tube(gap: float) -> FloatArray:
+    """Rings around a cylinder of radius 1."""
+    around = 200
+    height = gap * 2 * np.pi / around
+    turn = np.random.default_rng(0).uniform(0, 1, (8, 1))
+    angle = 2 * np.pi * np.arange(around) / around + turn
+    z = height * np.arange(8)[:, None] + 0 * angle
+    return np.stack([np.cos(angle), np.sin(angle), z], axis=2).reshape(-1, 3)
+
+
+def lidar() -> FloatArray:
+    """The unit sphere as seen by a spinning lidar 3 away from its middle."""
+    up = np.radians(np.linspace(-17, 17, 14))[:, None]
+    turn = np.radians(np.arange(-20, 20, 0.25))[None]
+    rays = np.stack([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up) + 0 * turn])
+    rays = rays.reshape(3, -1).T
+    middle = rays @ [3.0, 0.0, 0.0]
+    hits = middle**2 > 8.05
+    return rays[hits] * (middle[hits] - np.sqrt(middle[hits] ** 2 - 8))[:, None]
+
+
+@pytest.mark.parametrize(
+    ("points", "loops", "distortion"),
+    [
+        (lambda: strips(8), 1, 1e-6),
+        (lambda: strips(12), 1, 1e-6),
+        (lambda: strips(20), 1, 1e-6),
+        (lambda: strips(30), 1, 1e-6),
+        (lambda: terrain(12), 1, 0.02),
+        (lambda: terrain(30), 1, 0.03),
+        (lambda: tube(12), 2, 0.01),
+        (lidar, 1, 0.05),
+    ],
+)
+def test_lines_show_the_surface(
+    points: Callable[[], FloatArray], loops: int, distortion: float
+) -> None:
+    """All points are on one piece with its true rims, and angles stay."""
+    cloud = points()
+    flat = flat_map(Frame.of(cloud).inside(cloud))
+    assert len(flat.anchors) == len(cloud)
+    assert flat.facts["genus"] == 0
+    assert flat.facts["boundary_loops"] == loops
+    ratio = np.divide(*np.linalg.svd(flat.jacobians, compute_uv=False).T)
+    assert np.median(ratio) < 1 + distortion
+
+
+def test_lines_farther_apart_are_refused_with_advice() -> None:
+    """No surface can be told from lines that nobody sees side by side."""
+    with pytest.raises(InputError, match="keep every tenth point of each line"):
+        ComputedMap().fit(strips(100, 4000))
+
+
+def test_lines_are_one_component() -> None:
+    """Two sheets of lines are two."""
+    sheet = strips(20, 2000)
+    both = np.concatenate([sheet, sheet + np.array([0, 0, 2000.0])])
+    np.testing.assert_array_equal(cloud_labels(both), np.arange(4000) >= 2000)
+
+
+def test_neighbourhoods_grow_on_lines_alone() -> None:
+    """As wide as the next line is away; clouds that are dense in all directions have none."""
+    count = breadth(strips(20))
+    assert count is not None
+    assert (count >= 20).all()
+    grid = np.stack(np.meshgrid(np.arange(20.0), np.arange(20.0), [0.0]), axis=-1).reshape(-1, 3)
+    assert breadth(grid) is None
+    mixed = np.concatenate([grid, strips(20) + np.array([0, 100, 0])])
+    found = breadth(mixed)
+    assert found is not None
+    assert (found[:400] == NEAREST).mean() > 0.9

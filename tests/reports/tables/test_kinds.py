@@ -1,0 +1,38 @@
+import math
+
+import pytest
+
+from reports.contents import contents
+from reports.tables.kinds import means_by_kind, success
+
+from ..conftest import DEVIL, HAND, NEFERTITI, seeded
+
+
+def test_success_counts_skips_and_compares_on_common_models(results):
+    suite = contents(results)[0]
+    made = success(suite)
+    rows = {row["label"]: row for row in made.blocks[0]}
+    assert rows["SLIM symmetric Dirichlet"]["disk ok"] == "2/2"
+    assert rows["SLIM symmetric Dirichlet"]["closed, genus 0 ok"] == "0/1"
+    assert rows["ParaPoint"]["closed, genus 0 ok"] == "1/1"
+    assert rows["ParaPoint"]["all ok"] == "3/3"
+    assert rows["ParaPoint"]["disk bijective"] == "2/2"
+    assert rows["ParaPoint"]["closed, genus 0 bijective"] == "0/1"  # it spans its seam
+    values = suite.means.set_index(["label", "case"])["angle_difference_mean"]["ParaPoint"]
+    disks, closed = ({row["label"]: row for row in block} for block in means_by_kind(suite).blocks)
+    common = disks["ParaPoint"]["angle_difference_mean"]
+    assert common == pytest.approx(values[[HAND, DEVIL]].mean())
+    assert disks["ParaPoint"]["kind"] == "disk: means over 2 of 2"
+    assert closed["ParaPoint"]["angle_difference_mean"] == pytest.approx(values[NEFERTITI])
+    assert closed["SLIM symmetric Dirichlet"].get("angle_difference_mean") is None
+
+
+def test_a_value_that_is_missing_on_a_common_model_leaves_no_mean(tmp_path):
+    suite = seeded(tmp_path, cases=("a", "b"), seeds=(0,))
+    records = suite.records
+    records["b", "LSCM"]["seconds"] = math.nan
+    rows = {row["label"]: row for row in means_by_kind(suite).blocks[0]}
+    assert (
+        rows["LSCM"]["seconds"] is None
+    )  # the mean over one model would stand beside one over two
+    assert rows["ParaPoint"]["seconds"] == 0.25
