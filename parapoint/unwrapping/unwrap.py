@@ -161,7 +161,7 @@ class Unwrap:
         return Parameterization(run.uv, run.mesh.faces, report=report)
 
     def _uncut(self, mesh: Mesh, deadline: float) -> Run | None:
-        """SLIM without a cut, where the mesh has such a map and the price may be too high."""
+        """The map without a cut, where the mesh has one and the price may be too high."""
         if self.price is None or not mesh.is_planar_domain:
             return None
         run = Run(mesh, deadline)
