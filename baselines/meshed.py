@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from baselines.disks.lscm import LSCM
 from baselines.disks.slim import SLIM
-from baselines.tools.meshlab import pymeshlab
+from baselines.tools.meshlab import failed, pymeshlab
 from baselines.tools.xatlas_charts import Xatlas
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
@@ -138,6 +138,7 @@ def reconstructed(cloud: PointCloud, kind: str) -> tuple[Mesh, dict[str, object]
         for step, options in CLEANING:
             meshes.apply_filter(step, **options)
     except pymeshlab.PyMeshLabException as error:
+        failed.append(meshes)
         raise FlatteningError(f"MeshLab: {' '.join(str(error).split())}") from None
     made = meshes.current_mesh()
     if made.face_number() == 0:

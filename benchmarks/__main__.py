@@ -58,6 +58,25 @@ def _list(_: click.Context, __: click.Parameter, text: str | None) -> list[str] 
     return None if text is None else split(text)
 
 
+def _cases(_: click.Context, __: click.Parameter, text: str | None) -> list[str] | None:
+    """The value of --cases: names that commas separate. A file's own name may hold commas too.
+
+    Raises:
+        InputError: a name is empty.
+    """
+    if text is None:
+        return None
+    parts, found = text.split(","), []
+    while parts:
+        whole = [n for n in range(len(parts), 1, -1) if Path(",".join(parts[:n]).strip()).is_file()]
+        count = whole[0] if whole else 1
+        found.append(",".join(parts[:count]).strip())
+        del parts[:count]
+    if not all(found):
+        raise InputError(f"{text!r} is no list such as cow,hand or cow,scans/my.ply")
+    return found
+
+
 def _seeds(_: click.Context, __: click.Parameter, text: str | None) -> list[int] | None:
     """The value of an option that is a list of seeds."""
     if text is None:
@@ -70,7 +89,7 @@ def _seeds(_: click.Context, __: click.Parameter, text: str | None) -> list[int]
 @main.command()
 @click.argument("suite", required=False)
 @click.option("--methods", callback=_list, help="Such as slim,tutte or 'slim(iterations=1),lscm'.")
-@click.option("--cases", callback=_list, help="Names of models, or paths of files of your own.")
+@click.option("--cases", callback=_cases, help="Names of models, or paths of files of your own.")
 @click.option("--seeds", callback=_seeds, help="Such as 0,1,2.")
 @click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Cells at once.")
 @click.option(
@@ -90,7 +109,8 @@ def _seeds(_: click.Context, __: click.Parameter, text: str | None) -> list[int]
 @click.option(
     "--memory",
     type=float,
-    help="GB a cell may hold.  [default: four fifths of the machine's, / jobs]",
+    help="GB a cell may hold, and a packed file decode to.  [default: four fifths of the "
+    "machine's, / jobs; 0.07 of a file]",
 )
 @click.option("--out", type=click.Path(path_type=Path), default="results", show_default=True)
 @click.option(
@@ -114,6 +134,10 @@ def run(
     """
     from benchmarks.cases import suites
     from benchmarks.commands.display import BAD
+    from parapoint.files.decoding import allow
+
+    if options["memory"] is not None:
+        allow(options["memory"] * 1e9)
 
     if suite is None and cases is not None:
         chosen = suites.Suite(

@@ -33,7 +33,7 @@ from parapoint.surfaces.parameterization import (
     TracePoint,
 )
 from parapoint.surfaces.seam_points import seam_points
-from parapoint.surfaces.strays import unmapped, without_strays
+from parapoint.surfaces.strays import far_from, unmapped, without_strays
 from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, PointCloud, Surface
 
 logger = logging.getLogger("parapoint")
@@ -186,12 +186,19 @@ class Estimator(ABC):
     def transform(self, points: npt.ArrayLike | Surface) -> FloatArray:
         """(N, 2) coordinates in the plane of (N, 3) points on the surface, in the points' unit.
 
-        Any number of points: they are mapped in batches, which bounds the memory.
+        Any number of points: they are mapped in batches, which bounds the memory. Rows of points
+        that lie far from the surface (`parapoint.surfaces.strays.far_from`) are NaN.
 
         Raises:
             InputError: the points have another shape or are not finite, or nothing is fitted.
         """
-        return self._known().flatten(coordinates(points, 3))
+        at, fitted = coordinates(points, 3), self._known()
+        is_far = far_from(fitted.points, at)
+        if not is_far.any():
+            return fitted.flatten(at)
+        uv = np.full((len(at), 2), np.nan)
+        uv[~is_far] = fitted.flatten(at[~is_far])
+        return uv
 
     def inverse_transform(self, uv: npt.ArrayLike) -> FloatArray:
         """(N, 3) points on the surface at (N, 2) coordinates of `transform`.
@@ -237,7 +244,7 @@ class Estimator(ABC):
                 no such rule.
         """
         at = self.points_ if points is None else coordinates(points, 3)
-        return seam_points(at, self.transform(at), rule)
+        return seam_points(at, self._known().flatten(at), rule)
 
     def parameterize(
         self, surface: Surface, *, seed: int
@@ -253,7 +260,7 @@ class Estimator(ABC):
         model = dataclasses.replace(self, seed=seed)  # type: ignore[type-var]  # a subclass is a dataclass
         at = coordinates(surface, 3)
         model._fit(surface, Session(watched=at if len(at) <= MOST_WATCHED else None))  # noqa: SLF001 (a copy of this one)
-        uv = unmapped(surface, model.transform(at))
+        uv = unmapped(surface, model.fitted_.flatten(at))
         if isinstance(surface, Mesh):
             return Parameterization(uv, surface.faces, model.trace_, model.report_)
         return PointParameterization(uv, model.trace_, model.report_)

@@ -8,8 +8,8 @@ from collections.abc import Collection
 
 from parapoint.errors import InputError
 
-LARGEST_SEED = 2**32 - 1
-"""Largest seed that every generator of random numbers takes."""
+LARGEST_SEED = 2**63 - 1
+"""Largest seed: what torch takes and a column of a table holds."""
 LONGEST_SECONDS = 1e9
 """Largest time, in seconds, that may be asked for: some thirty years."""
 

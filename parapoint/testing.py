@@ -19,6 +19,8 @@ from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, PointCloud, S
 SEED = 7
 SIMILARITIES = ((5e5, 1e-6), (6e6, 1e6))
 """Shifts, in sizes of the surface, and scales of the similar surfaces that are tried."""
+STRAY = 1e6
+"""How far away, in sizes of the surface, a vertex lies that belongs to no face."""
 ALIKE = 1e-3
 """Most that a measure of the map of a similar surface differs by; more only if seeds do."""
 OTHER_SEEDS = (1, 2, 3)
@@ -44,7 +46,8 @@ def check_method(method: Method, surface: Surface | None = None) -> None:
       corners are in the order of the mesh.
     - The same seed gives the same map, bit by bit, unless the method says that it is not
       `deterministic`. The arrays of the surface do not change.
-    - A similar surface, far from the origin and in another unit, has a map alike: what the map
+    - A similar surface, far from the origin and in another unit, or with a far vertex that belongs
+      to no face, has a map alike: what the map
       does to lengths and areas differs by ALIKE at most, or by what seeds make it differ.
     - A trace counts up in steps and seconds, and its maps are finite and of the result's shape.
 
@@ -292,10 +295,19 @@ def _check_similar(
 ) -> None:
     """The map of a similar surface is alike, wherever it lies, in any unit."""
     known = measures(surface, first)
-    for shift, scale in SIMILARITIES:
-        what = f"{where}: moved by {shift:g} times its size and scaled by {scale:g}, it"
+    cases: dict[str, Surface] = {
+        f"moved by {shift:g} times its size and scaled by {scale:g}": similar(surface, shift, scale)
+        for shift, scale in SIMILARITIES
+    }
+    if isinstance(surface, Mesh) and surface.seams is None:
+        far = surface.vertices[:1] + STRAY * float(np.ptp(surface.vertices, axis=0).max())
+        cases["with a far vertex of no face"] = Mesh(
+            np.concatenate([surface.vertices, far]), surface.faces
+        )
+    for how, moved in cases.items():
+        what = f"{where}: {how}, it"
         try:
-            found = method.parameterize(similar(surface, shift, scale), seed=SEED)
+            found = method.parameterize(moved, seed=SEED)
         except MissingError:
             raise
         except Exception as error:

@@ -83,7 +83,7 @@ def unwrapped(
     process, version = _waiting.pop() if _waiting else started()
     with TemporaryDirectory() as folder:
         source, target = Path(folder, "mesh.npz"), Path(folder, "uv.npy")
-        np.savez(source, vertices=in_unit(vertices), faces=faces)
+        np.savez(source, vertices=in_unit(vertices, faces), faces=faces)
         task = {"source": str(source), "target": str(target)}
         output, _ = process.communicate(
             json.dumps(task | {"operator": operator, "options": options}) + "\n"

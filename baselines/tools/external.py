@@ -77,7 +77,10 @@ class External:
             mesh.vertices[mesh.faces],
             surface.vertices[surface.faces],
             rtol=0,
-            atol=1e-4 * np.ptp(surface.vertices, axis=0).max(),  # programs print few digits
+            atol=1e-4
+            * np.ptp(
+                surface.vertices[surface.referenced], axis=0
+            ).max(),  # programs print few digits
         )
         if not same:
             raise FlatteningError(f"{words[0]} changed the faces or their order")

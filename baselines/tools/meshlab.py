@@ -20,6 +20,11 @@ pymeshlab = optional(
 )
 
 
+failed: list[Any] = []
+"""Mesh sets of which a filter failed. They are never destroyed, as pymeshlab then damages memory of
+the process: whatever reads texture coordinates later crashes (seen in 2025.7)."""
+
+
 def filtered(vertices: FloatArray, faces: IntArray, name: str, **options: object) -> Any:
     """The MeshSet of these vertices and faces after a filter that makes texture coordinates.
 
@@ -34,6 +39,7 @@ def filtered(vertices: FloatArray, faces: IntArray, name: str, **options: object
     try:
         meshes.apply_filter(name, **options)
     except pymeshlab.PyMeshLabException as error:
+        failed.append(meshes)
         raise FlatteningError(" ".join(str(error).split())) from None
     return meshes
 
@@ -72,7 +78,7 @@ def disk_map(surface: Surface, name: str) -> Parameterization:
     """
     disk = domain(surface)
     check_triangles(disk.vertices, disk.faces)
-    made = filtered(in_unit(disk.vertices), disk.faces, name)
+    made = filtered(in_unit(disk.vertices, disk.faces), disk.faces, name)
     return Parameterization(scaled(disk, made.current_mesh().vertex_tex_coord_matrix()), disk.faces)
 
 
@@ -108,7 +114,7 @@ class MeshLabVoronoi:
                 f"needs at least {2 * self.regions} vertices for {self.regions} regions; "
                 f"there are {len(surface.vertices)}"
             )
-        unit = Mesh(in_unit(surface.vertices), surface.faces)
+        unit = Mesh(in_unit(surface.vertices, surface.faces), surface.faces)
         made = filtered(
             unit.vertices,
             unit.faces,
@@ -147,7 +153,7 @@ class MeshLabTriangles:
         if not isinstance(surface, Mesh):
             raise UnsupportedError("needs faces; the surface is a point cloud")
         made = filtered(
-            in_unit(surface.vertices),
+            in_unit(surface.vertices, surface.faces),
             surface.faces,
             "compute_texcoord_parametrization_triangle_trivial_per_wedge",
             textdim=self.page_size,

@@ -71,7 +71,7 @@ class UVAtlas:
             raise UnsupportedError("needs faces; the surface is a point cloud")
         library = open3d()
         made = library.t.geometry.TriangleMesh(
-            library.core.Tensor(in_unit(surface.vertices).astype(np.float32)),
+            library.core.Tensor(in_unit(surface.vertices, surface.faces).astype(np.float32)),
             library.core.Tensor(surface.faces.copy()),
         )
         try:

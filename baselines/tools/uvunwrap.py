@@ -55,11 +55,13 @@ class UVUnwrap:
         """
         if not isinstance(surface, Mesh):
             raise UnsupportedError("needs faces; the surface is a point cloud")
-        unit = UNIT / Frame.of(surface.vertices).scale
+        unit = UNIT / Frame.of(surface.vertices[surface.referenced]).scale
         options = asdict(self)
         options["max_boundary_length"] *= unit
         options["max_chart_area"] *= unit**2
-        given = uvunwrap.Mesh(in_unit(surface.vertices), surface.faces.astype(np.uint32))
+        given = uvunwrap.Mesh(
+            in_unit(surface.vertices, surface.faces), surface.faces.astype(np.uint32)
+        )
         try:
             made = uvunwrap.generate([given], **options)
         except BaseException as error:

@@ -94,8 +94,8 @@ class Xatlas:
         if not isinstance(surface, Mesh):
             raise UnsupportedError("needs faces; the surface is a point cloud")
         made = xatlas.Atlas()
-        vertices = in_unit(surface.vertices)
-        unit = UNIT / Frame.of(surface.vertices).scale
+        vertices = in_unit(surface.vertices, surface.faces)
+        unit = UNIT / Frame.of(surface.vertices[surface.referenced]).scale
         made.add_mesh(vertices.astype(np.float32), surface.faces.astype(np.uint32))
         chart_options, pack_options = xatlas.ChartOptions(), xatlas.PackOptions()
         for field in fields(self):

@@ -81,7 +81,7 @@ def bakings(cases: tuple[str, ...] = CASES, points: int = POINTS) -> Iterator[Ba
         mesh = load(case)
         if not isinstance(mesh, Mesh):
             raise InputError(f"{case}: is a cloud; clouds with known colours are made of meshes")
-        side = float(np.ptp(mesh.vertices, axis=0).max())
+        side = float(np.ptp(mesh.vertices[mesh.referenced], axis=0).max())
         seen = surface_sample(mesh.vertices, mesh.faces, points, 0)
         unseen = surface_sample(mesh.vertices, mesh.faces, HELD_OUT, 1)
         for spec in (OURS, *TODAY):

@@ -15,6 +15,7 @@ from benchmarks.rendering.maps import ANGLE_SCALE, AREA_SCALE, Layout, Map, heat
 from benchmarks.rendering.scene import Scene
 from benchmarks.rendering.viewpoints import two_cameras
 from parapoint.errors import InputError
+from parapoint.files.targets import complete_file
 from parapoint.surfaces.surface import FloatArray
 
 PIXELS = 560
@@ -30,11 +31,9 @@ def write_heatmap(state: MapState, path: Path, *, title: str) -> None:
     The renderer and the colours are those of the reports; faces that span a seam are left grey.
 
     Raises:
-        InputError: the path does not end in .png, or the map has no area.
+        InputError: the map has no area.
         OSError: the file cannot be written.
     """
-    if path.suffix.lower() != ".png":
-        raise InputError(f"{path}: the heatmap is a PNG; give a name that ends in .png")
     found = Map(state.mesh, state.parameterization)
     if not found.has_area:
         raise InputError(f"{title}: the map has no area in the UV plane, so there is no heatmap")
@@ -58,7 +57,8 @@ def write_heatmap(state: MapState, path: Path, *, title: str) -> None:
     for axis, heading in zip(axes[0], HEADINGS, strict=True):
         axis.set_title(heading, fontsize=11)
     figure.suptitle(f"{title}: distortion of {len(state.mesh.faces):,} faces")
-    figure.savefig(path, format="png")
+    with complete_file(path) as file:
+        figure.savefig(file, format="png")
 
 
 def _scale_end(logarithms: FloatArray) -> float:

@@ -125,7 +125,9 @@ def bare_xatlas(mesh: Mesh, _: Parameterization) -> Call:
 
     def call() -> None:
         atlas = xatlas.Atlas()
-        atlas.add_mesh(in_unit(mesh.vertices).astype(np.float32), mesh.faces.astype(np.uint32))
+        atlas.add_mesh(
+            in_unit(mesh.vertices, mesh.faces).astype(np.float32), mesh.faces.astype(np.uint32)
+        )
         atlas.generate()
         atlas.get_mesh(0)
 
@@ -138,7 +140,7 @@ def bare_uvatlas(mesh: Mesh, _: Parameterization) -> Call:
 
     def call() -> None:
         made = open3d.t.geometry.TriangleMesh(
-            open3d.core.Tensor(in_unit(mesh.vertices).astype(np.float32)),
+            open3d.core.Tensor(in_unit(mesh.vertices, mesh.faces).astype(np.float32)),
             open3d.core.Tensor(mesh.faces.copy()),
         )
         made.compute_uvatlas(size=512, gutter=1.0, max_stretch=1 / 6, nthreads=1)
@@ -153,7 +155,7 @@ def bare_uvunwrap(mesh: Mesh, _: Parameterization) -> Call:
 
     def call() -> None:
         made = uvunwrap.generate(
-            [uvunwrap.Mesh(in_unit(mesh.vertices), mesh.faces.astype(np.uint32))]
+            [uvunwrap.Mesh(in_unit(mesh.vertices, mesh.faces), mesh.faces.astype(np.uint32))]
         )
         np.array(made.meshes[0].uv)
 
@@ -168,7 +170,7 @@ def bare_meshlab(name: str, **options: object) -> Bare:
 
         def call() -> None:
             meshes = pymeshlab.MeshSet(verbose=False)
-            meshes.add_mesh(pymeshlab.Mesh(in_unit(mesh.vertices), mesh.faces))
+            meshes.add_mesh(pymeshlab.Mesh(in_unit(mesh.vertices, mesh.faces), mesh.faces))
             meshes.apply_filter(name, **options)
             made = meshes.mesh(len(meshes) - 1)
             made.vertex_matrix(), made.face_matrix()

@@ -17,8 +17,10 @@ from benchmarks.metrics.grades import BOUNDS, grade
 from benchmarks.metrics.metric import GROUPS, WITHOUT_SPANNING
 from benchmarks.metrics.state import MapState
 from benchmarks.metrics.table import METRICS
+from parapoint.commands.memory import memory_option
 from parapoint.errors import InputError
 from parapoint.files.reading import faults_of, has_faces, read_parameterized, read_point_map
+from parapoint.files.targets import checked_picture
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 
@@ -36,6 +38,7 @@ WIDTH = 160
 @click.option(
     "--reference", type=click.Path(path_type=Path), help="Another map of the same faces: its UV."
 )
+@memory_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object {metric: value}.")
 @click.option(
     "--heatmap", type=click.Path(path_type=Path), metavar="OUT.png", help="Draw the distortion."
@@ -46,6 +49,8 @@ def score(file: Path, *, reference: Path | None, as_json: bool, heatmap: Path | 
     Polygons are triangulated first; faces are the triangles, numbered from 0 in the file's order.
     JSON has no infinity: an infinite value is the string "inf".
     """
+    given = [file] if reference is None else [file, reference]
+    picture = None if heatmap is None else checked_picture(heatmap, inputs=given)
     if not has_faces(file):
         if reference is not None or heatmap is not None:
             raise InputError(f"{file}: --reference and --heatmap need a mesh, not a point cloud")
@@ -58,10 +63,10 @@ def score(file: Path, *, reference: Path | None, as_json: bool, heatmap: Path | 
         state = map_state(file, reference)
         values = evaluation.values(state)
         title = f"{file}: {summary(state)}"
-        if heatmap is not None:
+        if picture is not None:
             from benchmarks.commands.heatmap import write_heatmap
 
-            write_heatmap(state, heatmap, title=file.name)
+            write_heatmap(state, picture, title=file.name)
     found = grade(values, of_cloud=state is None)
     if as_json:
         print(json.dumps({"grade": found, **json_values(values)}, allow_nan=False))

@@ -17,7 +17,7 @@ class Rays:
 
     def __init__(self, mesh: Mesh, *, embree: bool = True) -> None:
         self._mesh = mesh
-        self._frame = Frame.of(mesh.vertices)  # embree works in single precision
+        self._frame = Frame.of(mesh.vertices[mesh.referenced])  # embree works in single precision
         self._scene: Any = None
         self._tree: Any = None
         if embree:

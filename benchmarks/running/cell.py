@@ -8,6 +8,7 @@ exit handlers.
 from __future__ import annotations
 
 import contextlib
+import errno
 import faulthandler
 import functools
 import os
@@ -23,6 +24,7 @@ from typing import Never
 import numpy as np
 
 from baselines import registry
+from benchmarks.running.environment import load
 from benchmarks.running.tasks import Job, MeasureJob, Outcome, Prepared, RunJob, from_json, to_json
 from benchmarks.store.archives import (
     arrays_hash,
@@ -34,7 +36,7 @@ from benchmarks.store.archives import (
 )
 from benchmarks.store.measuring import measured
 from benchmarks.store.records import plain
-from benchmarks.store.rows import MISSING, SOURCE_CHANGED, Status
+from benchmarks.store.rows import MACHINE, MISSING, SOURCE_CHANGED, Status
 from parapoint.errors import InputError
 from parapoint.method import MissingError, UnsupportedError
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization
@@ -43,6 +45,8 @@ from parapoint.surfaces.surface import Mesh, Surface
 
 LONGEST_MESSAGE = 1 << 20
 """Bytes that the line of an outcome may have, the method's report included."""
+MACHINE_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.ENFILE)
+"""Errors of the system for which no method can be blamed, wherever they are raised."""
 LONGEST_REASON = 500
 """Characters of an error's message that a row keeps."""
 
@@ -64,7 +68,7 @@ def perform(job: Job, send: int) -> Never:
     own = os.getpid()
     seed = job.seed if isinstance(job, RunJob) else 0
     random.seed(seed)
-    np.random.seed(seed % 2**32)  # noqa: NPY002  for methods that draw from the global one
+    np.random.seed(seed)  # noqa: NPY002  for methods that draw from the global one
     try:
         outcome = _done(job, send)
     except BaseException as error:  # noqa: BLE001  whatever a method raises is a row
@@ -105,9 +109,12 @@ def run(job: RunJob, send: int) -> Outcome:
     _, method = registry.method(job.spec)
     if registry.source_hash(method) != job.source_hash:
         return Outcome("failed", SOURCE_CHANGED)
-    whole = read_surface(job.surface)
-    if isinstance(whole, Mesh) and job.reference and "seams" in method.requires:
-        whole = Mesh(whole.vertices, whole.faces, _reference(job.reference).seams(whole))
+    try:
+        whole = read_surface(job.surface)
+        if isinstance(whole, Mesh) and job.reference and "seams" in method.requires:
+            whole = Mesh(whole.vertices, whole.faces, _reference(job.reference).seams(whole))
+    except InputError as error:  # a file of the store
+        return Outcome("failed", MACHINE + _line(error))
     ended: Callable[..., Outcome] = Outcome
     own = os.getpid()
     try:
@@ -116,6 +123,7 @@ def run(job: RunJob, send: int) -> Outcome:
         _tell(send, Prepared(preparation.steps))
         if hasattr(method, "preload"):
             method.preload()
+        busy = load()
         before, wall = os.times(), time.perf_counter()
         maps = preparation.maps(method, job.seed)
         wall, after = time.perf_counter() - wall, os.times()
@@ -127,7 +135,8 @@ def run(job: RunJob, send: int) -> Outcome:
         return ended(*failure(error))
     _end_fork(own)
     processor = sum(after[:4]) - sum(before[:4])
-    ended = functools.partial(ended, seconds=wall, cpu_seconds=processor)
+    busy = max((one for one in (busy, load()) if one is not None), default=None)
+    ended = functools.partial(ended, seconds=wall, cpu_seconds=processor, load=busy)
     for surface, part in zip(preparation.parts, maps, strict=True):
         if reason := fault(surface, part):
             return ended("failed", reason)
@@ -137,8 +146,8 @@ def run(job: RunJob, send: int) -> Outcome:
     report = plain(result.report)
     try:
         write_arrays(job.map, everything)
-    except OSError as error:  # not the method's fault: the run cannot go on
-        return Outcome("failed", f"{job.map}: {error.strerror}", fatal=True)
+    except OSError as error:
+        return ended(*failure(error))
     return ended("ok", uv_sha256=arrays_hash(arrays), report=report)
 
 
@@ -200,7 +209,8 @@ def failure(error: BaseException) -> tuple[Status, str]:
     # torch raises a plain RuntimeError when the CPU allocator fails.
     lacking = lacking or "can't allocate memory" in str(error)
     status: Status = "out_of_memory" if lacking else "failed"
-    return status, f"{name}: {_line(error)}".removesuffix(": ")
+    begins = MACHINE if isinstance(error, OSError) and error.errno in MACHINE_ERRORS else ""
+    return status, f"{begins}{name}: {_line(error)}".removesuffix(": ")
 
 
 def _line(error: BaseException) -> str:

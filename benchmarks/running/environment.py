@@ -43,6 +43,18 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
+def load() -> float | None:
+    """Processes that ran or waited for a processor in the last minute, over the processors.
+
+    Above 1 some had to wait, so that a wall time says more of the machine than of the method. All
+    programs of the machine count. None where the system does not tell.
+    """
+    try:
+        return os.getloadavg()[0] / (os.cpu_count() or 1)
+    except (AttributeError, OSError):  # not on every system
+        return None
+
+
 def memory() -> int:
     """Bytes of memory that this machine has, or the container that the process runs in."""
     import psutil

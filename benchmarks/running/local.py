@@ -20,12 +20,18 @@ from typing import Self
 import psutil
 
 from benchmarks.running import environment, scratch
+from benchmarks.running.limits import adopt_orphans, end_orphans
 from benchmarks.running.tasks import Message, Outcome, Ready, Task, Tick, from_json, to_json
 from benchmarks.store.archives import disk_said
+from benchmarks.store.rows import WATCHER_KILLED
 from parapoint.errors import InputError
 
 GRACE = 15.0
 """Seconds past a cell's time limit after which its supervisor counts as hung."""
+LONGEST_LINE = 1 << 22
+"""Bytes of a supervisor's answer, at most."""
+MOST_STARTS = 3
+"""How often a supervisor that ends before it is ready is started again."""
 OUTPUT_KEPT = 1 << 16
 """Bytes of a method's output that are kept in memory: the last ones."""
 THREAD_VARIABLES = (
@@ -70,6 +76,7 @@ class _Slot:
         self.ready = False
         self.task: Task | None = None
         self.folder: Path | None = None  # never the working directory: `_end` removes it
+        self.number = 0
         self.started = math.inf
 
     @property
@@ -83,7 +90,7 @@ class _Slot:
         self.folder = folder
         self.started = time.monotonic()
         inputs = {name: path.resolve() for name, path in task.job.inputs.items()}
-        job = dataclasses.replace(task.job.reading(inputs), folder=folder)
+        job = dataclasses.replace(task.job.reading(inputs), folder=folder, number=self.number)
         with contextlib.suppress(OSError):  # `hear` notices a supervisor that is gone
             self.jobs.write(to_json(job))
 
@@ -91,12 +98,14 @@ class _Slot:
         """The messages that have come in; None once the supervisor is gone.
 
         Raises:
-            ValueError: a line is no message.
+            ValueError: a line is no message, or too long for one.
         """
         content = _available(self.replies)
         if content is None:
             return None
         *lines, self.reply = (self.reply + content).split(b"\n")
+        if len(self.reply) > LONGEST_LINE:
+            raise ValueError("a line is too long")
         return [from_json(bytes(line), Ready, Outcome) for line in lines]
 
     def drain(self) -> None:
@@ -155,6 +164,11 @@ class Local:
         self.slots: set[_Slot] = set()
         self.harmful: set[tuple[str, ...]] = set()
         """Modules whose import ended a supervisor; tasks that need them import them themselves."""
+        self.sent = 0
+        self.starts = 0
+        self.others = {child.pid for child in psutil.Process().children()}
+        """Children that this process had before: no orphans of cells."""
+        adopt_orphans()
 
     def __enter__(self) -> Self:
         """Clear what a run that was killed may have left."""
@@ -165,6 +179,8 @@ class Local:
         """End all supervisors, and every process below them."""
         for slot in self.slots:
             slot.close()
+        end_orphans(self.others)
+        adopt_orphans(is_parent=False)
         self.selector.close()
         scratch.remove(self.folder)
 
@@ -198,9 +214,11 @@ class Local:
     def _begin(self, slot: _Slot, task: Task) -> None:
         """Let a supervisor that is ready begin its task, in a new folder."""
         with disk_said(self.folder):
-            self.folder.mkdir(exist_ok=True)
+            scratch.renew(self.folder)
             folder = Path(tempfile.mkdtemp(dir=self.folder)).resolve()
             (folder / "work").mkdir()
+        self.sent += 1
+        slot.number = self.sent
         slot.begin(task, folder)
         task.began()
 
@@ -216,19 +234,21 @@ class Local:
             for message in news or ():
                 self._take_in(slot, message)
             if news is None:
-                self._lost(slot, "killed the process that watched over it")
+                self._lost(slot, WATCHER_KILLED)
         now = time.monotonic()
         for slot in [slot for slot in self.slots if now > slot.started + slot.time_limit + GRACE]:
             self._lost(slot, "")
 
     def _take_in(self, slot: _Slot, message: Message) -> None:
-        """Deal with a message. A supervisor without a task has nothing to say."""
+        """Deal with a message; one that is not about the supervisor's task is no answer to it."""
         if slot.task is None:
             return
         if isinstance(message, Outcome) and slot.ready:
-            self._end(slot, message)
+            if message.number == slot.number:
+                self._end(slot, message)
         elif isinstance(message, Ready) and not slot.ready:
             slot.ready = True
+            self.starts = 0
             self._begin(slot, slot.task)
 
     def _lost(self, slot: _Slot, reason: str) -> None:
@@ -239,18 +259,23 @@ class Local:
             reason: why the task that it had begun fails, unless its time is over.
 
         Raises:
-            RuntimeError: it had no task, so that nothing but our own code can have ended it.
+            InputError: no supervisor comes to be ready, time after time.
         """
         self.slots.discard(slot)
         self.selector.unregister(slot.replies)
         self.selector.unregister(slot.output)
         slot.close()
-        if not slot.ready and slot.modules and slot.task is not None:
-            self.harmful.add(slot.modules)
+        end_orphans(self.others | {other.process.pid for other in self.slots})
+        if slot.task is None:  # killed from outside, between two tasks
+            return
+        if not slot.ready:
+            self.starts += 1
+            if slot.modules:
+                self.harmful.add(slot.modules)
+            elif self.starts >= MOST_STARTS:
+                said = last_lines(slot.printed, lines=1)
+                raise InputError(f"no process can be started for a cell: {said}")
             self._assign(slot.task)
-        elif not slot.ready or slot.task is None:
-            said = last_lines(slot.printed, lines=1)
-            raise RuntimeError(f"benchmarks.running.worker ended unasked: {said}")
         elif time.monotonic() > slot.started + slot.time_limit:
             late = f"not done within the limit of {slot.time_limit:g} s, and hard to kill"
             self._end(slot, Outcome("timeout", late))
@@ -258,19 +283,11 @@ class Local:
             self._end(slot, Outcome("failed", reason))
 
     def _end(self, slot: _Slot, outcome: Outcome) -> None:
-        """Hand on the outcome of the task that a supervisor has done.
-
-        Raises:
-            InputError: this machine failed, so that the run cannot go on.
-        """
+        """Hand on the outcome of the task that a supervisor has done."""
         task, folder = slot.task, slot.folder
         assert task is not None
         assert folder is not None
         slot.task = None
-        if outcome.fatal:
-            raise InputError(
-                f"{outcome.reason}; earlier results are intact: mend that and run again"
-            )
         took, printed = time.monotonic() - slot.started, last_lines(slot.printed)
         outcome = dataclasses.replace(outcome, took=took, printed=printed)
         task.ended(outcome, folder / "map.npz")

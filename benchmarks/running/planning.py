@@ -16,7 +16,15 @@ from benchmarks.running import environment
 from benchmarks.running.cluster import WORKER_LOST
 from benchmarks.store.records import plain
 from benchmarks.store.results import Store
-from benchmarks.store.rows import MISSING, SOURCE_CHANGED, ResultRow, identity
+from benchmarks.store.rows import (
+    KILLED,
+    MACHINE,
+    MISSING,
+    SOURCE_CHANGED,
+    WATCHER_KILLED,
+    ResultRow,
+    identity,
+)
 from parapoint.errors import InputError
 from parapoint.files.reading import faults_of, read_parameterized
 from parapoint.parameters import LARGEST_SEED, check_whole
@@ -30,6 +38,10 @@ LIMITS = {"timeout": "time_limit", "out_of_memory": "memory_limit"}
 LIMIT_RAISED = 1.01
 """Ratio to the limit of the earlier run beyond which a limit counts as raised. The memory that a
 machine reports varies a little from day to day."""
+
+
+MACHINE_FAILED = "machine failed"
+"""Why a cell runs again that has ended through no fault of its method."""
 
 
 @dataclass(frozen=True)
@@ -148,6 +160,21 @@ def surfaces(store: Store, cases: Sequence[str]) -> tuple[dict[str, str], dict[s
     return hashes, missing
 
 
+def mend(store: Store, planned: Sequence[Cell]) -> None:
+    """Store the files of a surface anew where a cell that runs again has found one damaged.
+
+    Raises:
+        InputError: the model cannot be read any more, or the disk is full.
+    """
+    cells = [cell.row for cell in planned if cell.why == MACHINE_FAILED]
+    for case, surface_hash in dict.fromkeys((row.case, row.surface_hash) for row in cells):
+        if store.is_whole(surface_hash):
+            continue
+        for path in store.paths_of(surface_hash):
+            path.unlink(missing_ok=True)  # ours: its name is the hash, and its content is not
+        surfaces(store, [case])
+
+
 def _origin(case: str, readers: str) -> str:
     """What decides the surface of a case: the content of its file, and the hash of its readers.
 
@@ -256,6 +283,10 @@ def changed(
         return "method changed"
     if row.reason == WORKER_LOST:
         return "workers were lost"
+    if row.reason.startswith(MACHINE):
+        return MACHINE_FAILED
+    if row.reason.startswith((WATCHER_KILLED, *(f"killed by {name} " for name in KILLED))):
+        return "was killed"
     if row.status == "ok":
         return "" if store.uv_path(row.id).exists() else "map missing"
     there = runs[row.run] if 0 <= row.run < len(runs) else {}

@@ -161,6 +161,7 @@ def run(
         here |= {"executor": executor, "jobs": jobs, "threads": workers.threads}
         todo, summary.kept = planning.plan(suite, chosen, hashes, store, here)
         summary.planned = todo
+        planning.mend(store, todo)
         progress.planned(summary)
         if todo:
             number = store.add_run(here | {"suite": suite.name})
@@ -266,7 +267,11 @@ class _Book:
         def ended(outcome: Outcome, path: Path) -> None:
             self.summary.method_seconds += outcome.seconds or outcome.took
             if outcome.status == "ok":
-                self.store.add_map(cell.row.id, path)
+                try:
+                    self.store.add_map(cell.row.id, path)
+                except FileNotFoundError:
+                    reason = "its map was gone, or no file, once it had ended"
+                    outcome = dataclasses.replace(outcome, status="failed", reason=reason)
             self.write(cell, outcome)
 
         began = functools.partial(self.progress.started, cell)
@@ -284,6 +289,7 @@ class _Book:
             preprocessing=outcome.preprocessing,
             seconds=outcome.seconds,
             cpu_seconds=outcome.cpu_seconds,
+            load=outcome.load,
             peak_memory_mb=outcome.peak_memory_mb,
             uv_file=f"uv/{cell.row.id}.npz" if is_ok else "",
             uv_sha256=outcome.uv_sha256 if is_ok else "",

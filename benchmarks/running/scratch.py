@@ -27,6 +27,18 @@ def clear(folder: Path) -> None:
     (folder / MARK).touch()
 
 
+def renew(folder: Path) -> None:
+    """Make a scratch folder of this run again if a cell has removed it or put a file in its place.
+
+    Raises:
+        OSError: it cannot be made.
+    """
+    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+        folder.unlink()
+    folder.mkdir(mode=0o700, exist_ok=True)
+    (folder / MARK).touch()
+
+
 def remove(folder: Path) -> None:
     """Remove a scratch folder. A folder without the mark stays, and so does a link to a folder."""
     if not folder.is_symlink() and (folder / MARK).is_file():

@@ -36,6 +36,7 @@ class Job(Message):
         time_limit: wall time that the job may take, in seconds.
         memory_limit: resident memory that all its processes together may hold, in bytes.
         folder: where the job may write; the executor sets it.
+        number: tells the job from others of its supervisor; the executor sets it.
     """
 
     surface: Path
@@ -43,6 +44,7 @@ class Job(Message):
     time_limit: float
     memory_limit: float
     folder: Path = Path()
+    number: int = 0
 
     @property
     def inputs(self) -> dict[str, Path]:
@@ -122,10 +124,10 @@ class Outcome(Message):
     Attributes:
         status: as in a row.
         reason: why, unless ok: one line.
-        fatal: whether this machine failed rather than the method, so that the run cannot go on.
         preprocessing: what was done to the surface before the method saw it; "" for nothing.
         seconds: wall time of the method alone; None if it did not come to its end.
         cpu_seconds: processor time of the same.
+        load: how busy the machine was, as in a row; None if not known.
         peak_memory_mb: peak resident memory of the job's processes, in units of 10^6 bytes.
         uv_sha256: hash of the map; "" where there is none.
         report: what the method wrote beside its result.
@@ -133,17 +135,18 @@ class Outcome(Message):
         printed: the last lines that the method printed.
         host: name and processor of the cluster's worker; "" on the run's own machine.
         took: wall time of the whole job, in seconds.
+        number: of the job; the supervisor sets it.
 
     Raises:
-        ValueError: a time or an amount of memory is negative or not finite.
+        ValueError: a time, a load or an amount of memory is negative or not finite.
     """
 
     status: Status
     reason: str = ""
-    fatal: bool = False
     preprocessing: str = ""
     seconds: float | None = None
     cpu_seconds: float | None = None
+    load: float | None = None
     peak_memory_mb: float | None = None
     uv_sha256: str = ""
     report: Mapping[str, object] = field(default_factory=dict)
@@ -151,9 +154,10 @@ class Outcome(Message):
     printed: str = ""
     host: str = ""
     took: float = 0.0
+    number: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("seconds", "cpu_seconds", "peak_memory_mb", "took"):
+        for name in ("seconds", "cpu_seconds", "load", "peak_memory_mb", "took"):
             amount = getattr(self, name)
             if amount is not None and not 0 <= amount < math.inf:
                 raise ValueError(f"Outcome.{name} cannot be {amount}")

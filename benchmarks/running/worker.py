@@ -8,8 +8,8 @@ the lines that go both ways.
 On Linux the child is a fork, which costs milliseconds. The supervisor itself only imports and never
 computes: it has no thread that a fork could lose (except OpenBLAS's own, which stop and restart
 around a fork). It imports nothing on behalf of a cell, and no plugin: the tenth cell finds what the
-first one found. Elsewhere, where forking after such imports is unsafe, the child is a fresh
-interpreter.
+first one found. All that it learns from its jobs is what the source files of methods import.
+Elsewhere, where forking after such imports is unsafe, the child is a fresh interpreter.
 
 A method can harm its own cell only. The child has its own session, its own empty working folder,
 and a result pipe that ends with it. At a limit all its descendants are killed, including those that
@@ -23,8 +23,8 @@ for as long as one poll.
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import dataclasses
+import functools
 import gc
 import importlib
 import os
@@ -41,7 +41,16 @@ import scipy.spatial  # noqa: F401  as above
 
 from baselines import registry
 from benchmarks.running import cell
-from benchmarks.running.limits import FORKS, bury, descendants, kill, resident, system_kills
+from benchmarks.running.limits import (
+    FORKS,
+    adopt_orphans,
+    bury,
+    descendants,
+    end_with,
+    kill,
+    resident,
+    system_kills,
+)
 from benchmarks.running.tasks import (
     Job,
     MeasureJob,
@@ -52,13 +61,14 @@ from benchmarks.running.tasks import (
     from_json,
     to_json,
 )
+from parapoint import sources
 
 POLL = 0.05
 """Seconds between two looks at the memory of the cell's process."""
 TREE_POLL = 0.5
 """Seconds between two looks at its descendants, which take some milliseconds to find."""
-PR_SET_PDEATHSIG = 1
-PR_SET_CHILD_SUBREAPER = 36
+LONGEST_SAID = 2 * cell.LONGEST_MESSAGE
+"""Bytes that a cell may write into the pipe of its outcome, where a method may write as well."""
 
 
 def main() -> None:
@@ -66,7 +76,7 @@ def main() -> None:
     reply = int(sys.argv[1])
     os.set_inheritable(reply, False)
     if FORKS:
-        ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+        adopt_orphans()
         for module in sys.argv[2:]:
             with contextlib.suppress(Exception):  # a method that needs it says so in its cell
                 importlib.import_module(module)
@@ -81,10 +91,27 @@ def main() -> None:
     os.write(reply, to_json(Ready()))
     while line := jobs.readline():
         job = from_json(line, RunJob, MeasureJob)
+        if isinstance(job, RunJob):
+            _parse(job.spec)
         if isinstance(job, MeasureJob):
             importlib.import_module("benchmarks.metrics.evaluation")  # once, before the forks
         outcome = _supervised(job, wake, [reply, wake, waker, jobs.fileno()])
-        os.write(reply, to_json(outcome))
+        os.write(reply, to_json(dataclasses.replace(outcome, number=job.number)))
+
+
+@functools.cache
+def _parse(spec: str) -> None:
+    """Parse the sources of a method, once for all its cells.
+
+    Each cell hashes the sources of its method (`parapoint.sources`), and needs to parse only those
+    that have changed since.
+    """
+    modules = ["parapoint.surfaces.preparation"]
+    location = registry.METHODS.get(spec.partition("(")[0].strip())
+    if location is not None:
+        modules.append(location.partition(":")[0])
+    with contextlib.suppress(Exception):  # a cell says what is wrong with its sources
+        sources.sources(*modules)
 
 
 def _supervised(job: Job, wake: int, private: list[int]) -> Outcome:
@@ -128,9 +155,12 @@ def _supervised(job: Job, wake: int, private: list[int]) -> Outcome:
         memory = resident(psutil.Process(child)) + others
         peak = max(peak, memory)
         verdict = verdict or _beyond(job, memory, now > deadline)
+        if len(message) > LONGEST_SAID:
+            message.clear()
+            verdict = verdict or Outcome("failed", "wrote into the pipe of its outcome")
         if verdict is not None:
             kill(child)
-    message += _available(result)
+    message += _available(result, LONGEST_SAID)
     os.close(result)
     bury(child)
     preprocessing, outcome = _said(message)
@@ -181,9 +211,7 @@ def _start(job: Job, send: int, private: list[int]) -> int:
         signal.set_wakeup_fd(-1)
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
         os.setsid()
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-        if os.getppid() != supervisor:
-            os._exit(1)
+        end_with(supervisor)
         for descriptor in private:
             os.close(descriptor)
         cell.perform(job, send)
@@ -220,11 +248,11 @@ def _death(status: int, *, killed_by_system: bool) -> Outcome:
     return Outcome("failed", f"ended the process (exit status {code}) with no result")
 
 
-def _available(pipe: int) -> bytes:
-    """What can be read from `pipe` without waiting."""
+def _available(pipe: int, most: int) -> bytes:
+    """What can be read from `pipe` without waiting, that many bytes and a chunk at most."""
     content = bytearray()
     with contextlib.suppress(BlockingIOError):
-        while chunk := os.read(pipe, 1 << 16):
+        while len(content) <= most and (chunk := os.read(pipe, 1 << 16)):
             content += chunk
     return bytes(content)
 

@@ -14,6 +14,7 @@ from benchmarks.store.archives import (
     arrays_hash,
     disk_said,
     map_arrays,
+    read_arrays,
     read_map,
     read_surface,
     replacing,
@@ -116,8 +117,31 @@ class Files:
             if not path.exists():
                 write_arrays(path, surface_arrays(cloud))
 
+    def paths_of(self, surface_hash: str) -> list[Path]:
+        """The files that may be stored of a surface."""
+        places = (self.surface_path, self.reference_path, self.exact_path)
+        return [place(surface_hash) for place in places]
+
+    def is_whole(self, surface_hash: str) -> bool:
+        """Whether the surface has the hash that it is named by, and its other files can be read."""
+        try:
+            content = surface_arrays(read_surface(self.surface_path(surface_hash)))
+            for path in self.paths_of(surface_hash)[1:]:
+                if path.exists():
+                    read_arrays(path)
+        except InputError:
+            return False
+        return arrays_hash(content).startswith(surface_hash)
+
     def add_map(self, row_id: str, path: Path) -> None:
-        """Move the map file `path`, which lies on the same disk, to its place."""
+        """Move the map file `path`, which lies on the same disk, to its place.
+
+        Raises:
+            FileNotFoundError: it is gone, or no file of the cell's own folder.
+            InputError: the disk is full.
+        """
+        if path.parent.is_symlink() or path.is_symlink() or not path.is_file():
+            raise FileNotFoundError(path)
         target = self.uv_path(row_id)
         with disk_said(target):
             target.parent.mkdir(exist_ok=True)

@@ -21,6 +21,13 @@ SOURCE_CHANGED = "the source of the method changed during the run; run again"
 """Reason of a row that the next run repeats, whatever hash it has."""
 MISSING = "not installed: "
 """How the reason begins where a package or program was missing; the next run tries again."""
+MACHINE = "through no fault of the method: "
+"""How the reason begins where this machine failed, by a full disk or a damaged file; the next run
+tries again."""
+KILLED = ("SIGHUP", "SIGINT", "SIGQUIT", "SIGKILL", "SIGTERM")
+"""Signals that come from outside, as a rule: a cell that one of them has ended is tried again."""
+WATCHER_KILLED = "the process that watched over it was killed"
+"""Reason of a row whose supervisor ended before the cell; the next run tries again."""
 IDENTITY = ("suite", "case", "method", "params", "seed", "source_hash", "surface_hash")
 """The fields of a row that its id is made of."""
 _log = logging.getLogger("parapoint")
@@ -46,6 +53,8 @@ class ResultRow:
         preprocessing: what was done to the surface before the method saw it; "" for nothing.
         seconds: wall time of `parameterize` alone.
         cpu_seconds: processor time of the same, over all threads and ended child processes.
+        load: how busy the machine was: processes that ran or waited for a processor, over the
+            number of processors (`benchmarks.running.environment.load`); None if not known.
         peak_memory_mb: peak resident memory of the cell's processes, in units of 10^6 bytes.
         uv_file: `uv/<id>.npz`; "" if there is no map.
         uv_sha256: `arrays_hash` of the map. The trace does not count, so equal maps have equal
@@ -69,6 +78,7 @@ class ResultRow:
     preprocessing: str = ""
     seconds: float | None = None
     cpu_seconds: float | None = None
+    load: float | None = None
     peak_memory_mb: float | None = None
     uv_file: str = ""
     uv_sha256: str = ""

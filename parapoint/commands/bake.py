@@ -7,11 +7,12 @@ from pathlib import Path
 
 import click
 
+from parapoint.commands.memory import memory_option
 from parapoint.commands.output import TEXTURE
 from parapoint.errors import InputError
 from parapoint.files.png import png
 from parapoint.files.reading import faults_of, read_parameterized, read_surface
-from parapoint.files.targets import checked_target, complete_file, sealed_png
+from parapoint.files.targets import checked_picture, complete_file, sealed_png
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.surface import Mesh, PointCloud
 from parapoint.textures.baking import (
@@ -34,6 +35,7 @@ from parapoint.textures.placing import Placing
 @click.option("--texture", type=int, default=TEXTURE, show_default=True, help="Texels a side.")
 @click.option("--margin", type=int, default=MARGIN, show_default=True, help="In texels.")
 @click.option("--force", is_flag=True, help="Replace files of yours that are in the way.")
+@memory_option
 @click.option("--json", "as_json", is_flag=True, help="Print the report as one JSON object.")
 def bake(
     model: str,
@@ -52,12 +54,10 @@ def bake(
     of points. Of a folder the texture fits the UVs that `map` writes. A normal map is in tangent
     space, as glTF has it; a position map is a geometry image of 16 bits.
     """
-    if Path(out).suffix.lower() != ".png":
-        raise InputError(f"{out}: a texture is written as .png")
     if kind not in MAPS:
         raise InputError(f"--map must be one of {', '.join(MAPS)}, not {kind!r}")
     check_size(texture, margin)
-    path = checked_target(out, inputs=[model, cloud], force=force)
+    path = checked_picture(out, inputs=[model, cloud], force=force)
     points = _points(cloud, kind)
     charted = _charted(model)
     with faults_of(Path(cloud)):

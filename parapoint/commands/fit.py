@@ -10,6 +10,7 @@ import click
 
 from parapoint import saving
 from parapoint.commands.fitting import estimator_of, fitted, summary
+from parapoint.commands.memory import memory_option
 from parapoint.files.reading import read_surface
 
 
@@ -37,6 +38,7 @@ from parapoint.files.reading import read_surface
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--device", help="Training: auto, cpu or cuda.")
 @click.option("--threads", type=int, help="Training: processor threads.")
+@memory_option
 @click.option("--json", "as_json", is_flag=True, help="Print the report as one JSON object.")
 def fit(surface: str, out: str, preset: str, as_json: bool, **settings: Any) -> None:
     """Find the map of a mesh or a point cloud and save it in DIR.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 
 import numpy as np
@@ -10,16 +11,18 @@ from parapoint.errors import InputError
 from parapoint.estimator import Estimator
 from parapoint.files.mesh_writers import write_npz, write_ply, write_textured
 from parapoint.files.point_writers import write_points
-from parapoint.files.targets import beside, checked_target
+from parapoint.files.targets import beside, checked_picture, checked_target
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.sampling import mean_spacing
 from parapoint.surfaces.spanning import Transform, opened, spanning_edges
-from parapoint.surfaces.strays import unmapped
-from parapoint.surfaces.surface import Mesh, Surface
+from parapoint.surfaces.strays import far_from, named, unmapped
+from parapoint.surfaces.surface import BoolArray, Mesh, Surface
 from parapoint.textures.baking import MARGIN, baked
 from parapoint.textures.checkerboard import checkerboard
 from parapoint.textures.placing import BORDER, Placing
 from parapoint.textures.preview import write_preview
+
+logger = logging.getLogger("parapoint")
 
 ENDINGS = (".obj", ".glb", ".ply", ".npz")
 """Endings of files that a map can be written to."""
@@ -54,13 +57,11 @@ def preview_target(preview: str, out: str, surface: str, *, force: bool) -> Path
     Raises:
         InputError: it is no .png or the texture of `out`, or it cannot or may not be written.
     """
-    if Path(preview).suffix.lower() != ".png":
-        raise InputError(f"{preview}: a preview is written as .png")
     if Path(out).suffix in SIDES and Path(preview).absolute() == beside(
         Path(out).absolute(), ".png"
     ):
         raise InputError(f"{preview}: is the texture of {out}; take another name")
-    return checked_target(preview, inputs=[surface], force=force)
+    return checked_picture(preview, inputs=[surface], force=force)
 
 
 def write(
@@ -91,8 +92,9 @@ def write(
     facts: dict[str, object] = {"file": out, "mapped_points": len(points)}
     shown, pixels = placing.of(charted), checkerboard()
     if isinstance(surface, Mesh):
-        transform = _then(model, placing)
+        transform = _then(model.fitted_.flatten, placing)
         uv = transform(points)
+        _warn_of_far(out, far_from(model.points_, points) & surface.referenced)
         spans = spanning_edges(surface, uv, transform, mean_spacing(model.points_))
         parameterization = opened(surface, uv, spans)
         facts["spanning_faces"] = int((parameterization.corners != surface.faces).any(1).sum())
@@ -104,7 +106,12 @@ def write(
         else:
             write_textured(out, shown, pixels)
     elif ending == ".npz" or (ending in {".ply", ".obj"} and texture is None):
-        write_points(out, surface, unmapped(surface, _then(model, placing)(points)))
+        uv = unmapped(surface, _then(model.transform, placing)(points))
+        is_far = np.isnan(uv[:, 0])
+        if is_far.sum() > model.report_.get("strays", 0):  # of those of the fit the user has heard
+            _warn_of_far(out, is_far)
+        facts |= {"mapped_points": int((~is_far).sum()), "unmapped_points": int(is_far.sum())}
+        write_points(out, surface, uv)
     else:
         facts |= {"faces": len(charted.mesh.faces), "texture": size}
         pixels = checkerboard(pixels=max(1, size // 32))
@@ -118,6 +125,19 @@ def write(
     return facts
 
 
-def _then(model: Estimator, placing: Placing) -> Transform:
-    """The model's map, carried into the unit square."""
-    return lambda points: placing(model.transform(points))
+def _warn_of_far(out: str, is_far: BoolArray) -> None:
+    """Name the rows that lie far from the surface that the model was fitted to."""
+    if is_far.any():
+        logger.warning(
+            "%s: %d of %d points lie far from the surface of the model: row%s %s",
+            out,
+            is_far.sum(),
+            len(is_far),
+            "s" * bool(is_far.sum() > 1),
+            named(np.flatnonzero(is_far)),
+        )
+
+
+def _then(transform: Transform, placing: Placing) -> Transform:
+    """A map, carried into the unit square."""
+    return lambda points: placing(transform(points))

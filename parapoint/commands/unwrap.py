@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from parapoint.commands.fitting import estimator_of, fitted, summary
+from parapoint.commands.memory import memory_option
 from parapoint.commands.output import TEXTURE, preview_target, target, write
 from parapoint.errors import InputError
 from parapoint.files.reading import Polygons, read_polygons
@@ -36,6 +37,7 @@ from parapoint.textures.baking import check_size
 @click.option("--preview", metavar="FILE", help="FILE.png: the surface beside its layout.")
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--force", is_flag=True, help="Replace files of yours that are in the way.")
+@memory_option
 @click.option("--json", "as_json", is_flag=True, help="Print the report as one JSON object.")
 def unwrap(
     surface: str,

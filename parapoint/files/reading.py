@@ -175,7 +175,7 @@ def faults_of(path: Path) -> Iterator[None]:
 
 
 def read_point_map(path: str | Path) -> tuple[PointCloud, PointParameterization]:
-    """The points in a PLY (with u and v) or NPZ file (points, uv), and their map.
+    """The points in a PLY (u and v), NPZ (points, uv) or OBJ file (a vt for each v), and their map.
 
     Raises:
         InputError: as for `read_surface`; the file has faces or no UV; a row of them is neither
@@ -189,8 +189,13 @@ def read_point_map(path: str | Path) -> tuple[PointCloud, PointParameterization]
         uv = content.attributes.get("uv")
         if uv is None and {"u", "v"} <= set(content.attributes):
             uv = np.stack([content.attributes[name] for name in "uv"], axis=1)
+        if uv is None and content.uv is not None and len(content.uv) == len(content.vertices):
+            uv = content.uv
         if uv is None:
-            raise InputError("has no array 'uv'; a point map has points and uv")
+            raise InputError(
+                "has no uv for each point; a map of points is u and v in PLY, the array 'uv' in "
+                "NPZ, and as many vt as v lines in OBJ"
+            )
         return PointCloud(content.vertices), PointParameterization(uv)
 
 
@@ -226,18 +231,18 @@ def _mesh(content: Content) -> tuple[Mesh, IntArray]:
         face = int(np.flatnonzero(small)[0])
         raise InputError(f"face {face} has {int(content.sizes[face])} corners; it needs three")
     vertices = read_only(content.vertices, np.float64, "vertices", 3)
-    size = float(np.ptp(vertices / 2, axis=0).max(initial=0)) * 2
-    if size and not SMALLEST_MESH < size < LARGEST_MESH:
-        raise InputError(
-            f"its size is {size:g}, and areas of it are beyond a float64: scale it to between "
-            f"{SMALLEST_MESH:g} and {LARGEST_MESH:g}"
-        )
     outside = (content.corners < 0) | (content.corners >= len(vertices))
     if outside.any():
         corner = int(np.flatnonzero(outside)[0])
         face = int(np.searchsorted(np.cumsum(content.sizes), corner, side="right"))
         raise InputError(
             f"face {face} has a vertex index out of range; the file has {len(vertices)} vertices"
+        )
+    size = float(np.ptp(vertices[content.corners] / 2, axis=0).max(initial=0)) * 2
+    if size and not SMALLEST_MESH < size < LARGEST_MESH:
+        raise InputError(
+            f"its size is {size:g}, and areas of it are beyond a float64: scale it to between "
+            f"{SMALLEST_MESH:g} and {LARGEST_MESH:g}"
         )
     rows = triangle_rows(vertices, content.sizes, content.corners)
     return Mesh(vertices, content.corners[rows]), rows

@@ -79,6 +79,19 @@ def checked_target(
     return path
 
 
+def checked_picture(
+    out: str | Path, *, inputs: Iterable[str | Path] = (), force: bool = False
+) -> Path:
+    """The PNG file that is to be written for `out`; see `checked_target`.
+
+    Raises:
+        InputError: its name does not end in .png, or it cannot or may not be written.
+    """
+    if Path(out).suffix.lower() != ".png":
+        raise InputError(f"{out}: a picture is written as PNG; give a name that ends in .png")
+    return checked_target(out, inputs=inputs, force=force)
+
+
 def beside(path: Path, ending: str) -> Path:
     """The file of this ending beside `path`; an OBJ file cannot name one that holds blanks."""
     return path.with_name(re.sub(r"[\s#]", "_", path.stem) + ending)

@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 
 from parapoint.errors import InputError
-from parapoint.surfaces.surface import FloatArray
+from parapoint.surfaces.surface import FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +82,12 @@ UNIT = 100.0
 have lengths built in below which they see no triangle."""
 
 
-def in_unit(vertices: FloatArray) -> FloatArray:
-    """Vertices (V, 3) around the origin, UNIT from it at most: what tools of float32 are given."""
-    frame = Frame.of(vertices)
-    return UNIT * frame.inside(vertices)
+def in_unit(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Vertices (V, 3) around the origin, UNIT from it at most: what tools of float32 are given.
+
+    Those of no face (F, 3), which may lie anywhere, are at the origin.
+    """
+    used = np.unique(faces)
+    inside = np.zeros_like(vertices)
+    inside[used] = UNIT * Frame.of(vertices[used]).inside(vertices[used])
+    return inside

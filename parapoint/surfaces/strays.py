@@ -9,7 +9,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, PointCloud, Surface
+from parapoint.surfaces.frame import Frame
+from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh, PointCloud, Surface
 
 APART = 30.0
 """Sides of the cells, in typical spacings, through which points hang together. Lines of a scan
@@ -43,19 +44,23 @@ def without_strays(surface: Surface) -> tuple[Surface, dict[str, object]]:
     rows = np.flatnonzero(is_stray)
     if len(rows) == 0:
         return surface, {"strays": 0}
-    named = ", ".join(map(str, rows[:NAMED].tolist())) + ", ..." * (len(rows) > NAMED)
     logger.warning(
         "%d of %d points lie far from all others and are mapped nowhere: row%s %s",
         len(rows),
         len(is_stray),
         "s" * (len(rows) > 1),
-        named,
+        named(rows),
     )
     kept = ~is_stray
     normals = None if surface.normals is None else surface.normals[kept]
     attributes = {name: values[kept] for name, values in surface.attributes.items()}
     cloud = PointCloud(surface.points[kept], normals, surface.dropped, attributes)
     return cloud, {"strays": len(rows), "stray_rows": rows[:NAMED].tolist()}
+
+
+def named(rows: IntArray) -> str:
+    """The first NAMED of some row numbers (n,), for a message."""
+    return ", ".join(map(str, rows[:NAMED].tolist())) + ", ..." * (len(rows) > NAMED)
 
 
 def unmapped(surface: Surface, uv: FloatArray) -> FloatArray:
@@ -65,6 +70,24 @@ def unmapped(surface: Surface, uv: FloatArray) -> FloatArray:
     uv = uv.copy()
     uv[is_stray] = np.nan
     return uv
+
+
+def far_from(known: FloatArray, points: FloatArray) -> BoolArray:
+    """(N,) whether points (N, 3) are stray beside the points (n, 3) of a surface.
+
+    They are if they lie outside the ball around the surface, and farther from all of its points
+    than APART times the spacing of these.
+    """
+    frame = Frame.of(known)
+    with np.errstate(over="ignore"):
+        is_far: BoolArray = np.abs(frame.inside(points)).max(axis=1, initial=0) > 1
+        if is_far.any():
+            tree = cKDTree(known)
+            looked_at = known[:: len(known) // SAMPLED + 1]
+            nearest = tree.query(looked_at, min(NEAREST + 1, len(known)))[0][:, -1]
+            reach = APART * float(np.median(nearest))
+            is_far[is_far] = ~np.isfinite(tree.query(points[is_far], distance_upper_bound=reach)[0])
+    return is_far
 
 
 def stray_points(points: FloatArray) -> BoolArray:

@@ -18,11 +18,12 @@ from benchmarks.checks import regress
 from benchmarks.metrics.table import METRICS
 from benchmarks.store.rows import ResultRow
 from reports.contents import Contents, contents
+from reports.ranking import TIMES
 from reports.tables.suites import SUMMARY_METRICS
 
 Floats = npt.NDArray[np.float64]
 
-WATCHED = tuple(name for name in SUMMARY_METRICS if name != "seconds")
+WATCHED = tuple(name for name in SUMMARY_METRICS if name not in TIMES)
 """The metrics that are compared, over all faces and without those that span a seam."""
 
 DETERMINISTIC = frozenset(spec.partition("(")[0] for spec in regress.SOLVERS.methods)

@@ -23,6 +23,7 @@ from reports.pictures.figures import Drawn
 from reports.pictures.names import VIEWED, map_file, model_file, slug
 from reports.tables import leaderboard
 from reports.tables.leaderboard import MEASURES, SHOWN, Glance, Winner, definition, page_of, winner
+from reports.tables.notes import load_notes
 from reports.tables.published import published_values
 from reports.tables.table import Table, metric_column
 
@@ -83,6 +84,7 @@ class Card:
         label: the method.
         row: its cell.
         detail: its parameters that are told.
+        grade: of its map; "" where there is none, or it is not known.
         map: address of what the viewer reads, from the page; "" where there is none.
         pictures: addresses by what they show; of a mesh two, which the viewer takes the place of.
         numbers: the metrics of SHOWN.
@@ -92,6 +94,7 @@ class Card:
     label: Label
     row: ResultRow
     detail: str
+    grade: str
     map: str
     pictures: Mapping[str, str]
     numbers: Sequence[Number]
@@ -135,6 +138,11 @@ class Section:
     def counts(self) -> dict[str, int]:
         """Number of cells by status."""
         return dict(Counter(row.status.replace("_", " ") for row in self.contents.rows))
+
+    @property
+    def load_notes(self) -> list[str]:
+        """Which times are unsure, as the machine was busy."""
+        return load_notes(self.contents)
 
     @property
     def unfinished(self) -> list[ResultRow]:
@@ -255,6 +263,7 @@ class Section:
                     label,
                     row,
                     ", ".join(part for part in (label.detail, seed) if part),
+                    str(self._values[row.id]["grade"] or ""),
                     f"../../{viewed}" if viewed else "",
                     self._pictures(row),
                     self._numbers(case, label, row),

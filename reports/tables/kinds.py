@@ -18,7 +18,8 @@ from reports.contents import (
     number,
 )
 from reports.means import common_cases, common_values, statistic
-from reports.tables.notes import environment_note, failure_notes, legend, method_notes
+from reports.ranking import TIMES
+from reports.tables.notes import environment_note, failure_notes, legend, load_notes, method_notes
 from reports.tables.published import model
 from reports.tables.table import SHORT, Column, Table, Value, metric_column
 
@@ -97,7 +98,7 @@ def _share(count: int, of: int) -> str:
 KIND_METRICS = (
     *(ANGLE, AREA, ISOMETRIC, FLIPPED, OVERLAPPED),
     *(POINT_ANGLE, POINT_AREA, POINT_COLLISIONS, POINT_TEARS),
-    "seconds",
+    *TIMES,
 )
 """The metrics that are told kind by kind."""
 
@@ -138,5 +139,10 @@ def means_by_kind(contents: Contents) -> Table:
         ),
         blocks=tuple(blocks),
         set_apart=contents.atlases,
-        notes=(legend(contents), *method_notes(contents), environment_note(contents)),
+        notes=(
+            legend(contents),
+            *method_notes(contents),
+            *load_notes(contents),
+            environment_note(contents),
+        ),
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from reports.contents import Contents
+from reports.ranking import COLLAPSED_FLAG
 
 
 def environment_note(contents: Contents) -> str:
@@ -26,12 +27,34 @@ def environment_note(contents: Contents) -> str:
     return f"Run on: {places}. Seeds: {', '.join(map(str, seeds))}."
 
 
+BUSY = 1.25
+"""Load (processes that ran or waited, over the processors) above which times are told as unsure.
+
+On a machine that does nothing else a cell with all processors to itself comes to 1.
+"""
+
+
+def load_notes(contents: Contents) -> list[str]:
+    """Which times were taken while the machine had more to do than it could."""
+    timed = [row for row in contents.rows if row.seconds is not None]
+    busy = [row for row in timed if row.load is not None and row.load > BUSY]
+    notes = []
+    if busy:
+        most = max(row.load or 0 for row in busy)
+        notes.append(
+            f"The machine was busy during {len(busy)} of {len(timed)} cells (up to {most:.1f} "
+            "processes for each processor): their wall times are too long; processor times are "
+            "less touched."
+        )
+    return notes
+
+
 def grade_notes(contents: Contents) -> list[str]:
     """Which maps are broken and thus not ranked, and which are collapsed."""
     notes = []
     for grade, meaning in (
         ("broken", "broken, so not ranked"),
-        ("collapsed", "collapsed (a part of the surface is shrunk to nothing), ranked by angles"),
+        ("collapsed", f"collapsed, so ranked by angles alone ({COLLAPSED_FLAG})"),
     ):
         found = [
             f"{label} on {case}"

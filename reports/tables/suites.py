@@ -20,9 +20,16 @@ from reports.contents import (
     number,
 )
 from reports.means import STATISTICS, common_cases, common_values, own_values, statistic
-from reports.ranking import MOST_LEFT_OUT, may_rank, means_may_rank
+from reports.ranking import MOST_LEFT_OUT, TIMES, may_rank, means_may_rank
 from reports.tables.kinds import means_by_kind, success
-from reports.tables.notes import environment_note, failure_notes, grade_notes, legend, method_notes
+from reports.tables.notes import (
+    environment_note,
+    failure_notes,
+    grade_notes,
+    legend,
+    load_notes,
+    method_notes,
+)
 from reports.tables.published import AUTHORS, Verdict, claim_text, published_values, verdicts
 from reports.tables.statistics import paired_tests, seed_variance
 from reports.tables.table import Column, Table, Value, metric_column, metric_title
@@ -44,7 +51,7 @@ SUMMARY_METRICS = (
     POINT_AREA,
     POINT_COLLISIONS,
     POINT_TEARS,
-    "seconds",
+    *TIMES,
 )
 """The metrics of the printed comparison; its CSV has them all."""
 
@@ -141,7 +148,8 @@ def supplement(contents: Contents) -> Table | None:
         Column(SPANNING, "spanning %", digits=2, percent=True),
         Column("chart_count", "charts", digits=0),
         Column("seam_length", "seam", digits=2),
-        metric_column("seconds"),
+        metric_column("seconds", "wall", group="Time [s]"),
+        metric_column("cpu_seconds", "processor", group="Time [s]"),
         Column("done", "ok", text=True),
     ]
     authors = [
@@ -173,7 +181,7 @@ def supplement(contents: Contents) -> Table | None:
                 "label": label.short,
                 "grade": str(record["grade"] or ""),
                 **{name: number(record, name) for name in (SPANNING, "chart_count", "seam_length")},
-                "seconds": number(record, "seconds"),
+                **{name: number(record, name) for name in TIMES},
                 "done": f"{record['ok']}/{record['tried']}" if record["tried"] else "skipped",
             }
             if record["status"] != "ok":
@@ -199,9 +207,11 @@ def supplement(contents: Contents) -> Table | None:
         set_apart=contents.atlases,
         notes=(
             f"Grades: {BOUNDS}.",
+            *grade_notes(contents),
             *method_notes(contents),
             *_published_notes(authors),
             *failure_notes(contents),
+            *load_notes(contents),
             environment_note(contents),
         ),
     )
@@ -274,6 +284,7 @@ def comparison(contents: Contents, names: Sequence[str] = ()) -> Table:
             *([f"Not defined on all models: {', '.join(fewer)}."] if fewer else []),
             *method_notes(contents),
             *failure_notes(contents),
+            *load_notes(contents),
             environment_note(contents),
         ),
     )
@@ -354,7 +365,7 @@ def failures(contents: Contents) -> Table | None:
 
 def everything(contents: Contents) -> Table:
     """One row a cell with every metric: the CSV for other programs."""
-    names = ["seconds", *contents.metrics]
+    names = [*TIMES, *contents.metrics]
     by_id = contents.measured.set_index("id").to_dict("index")
     rows = tuple(
         {

@@ -72,6 +72,18 @@ def test_a_malformed_list_is_an_input_error(text):
         commands.split(text)
 
 
+def test_names_of_files_may_hold_what_lists_do(tmp_path, monkeypatch):
+    """Commas, quotes and brackets, as in files that people name."""
+    monkeypatch.chdir(tmp_path)
+    files = ["a, b.obj", "Bob's.obj", 'say "hi".ply', "1,2,3.xyz", "x (1.obj", "1"]
+    for name in files:
+        (tmp_path / name).touch()
+    assert commands._cases(None, None, ",".join(files)) == files
+    assert commands._cases(None, None, "cow, a, b.obj ,hand") == ["cow", "a, b.obj", "hand"]
+    with pytest.raises(InputError, match="no list such as"):
+        commands._cases(None, None, "cow,,hand")
+
+
 def test_help_is_light():
     code = (
         "import sys; from benchmarks import __main__ as m\n"
@@ -98,7 +110,7 @@ def test_help_is_light():
         ["run", "--seeds", "-1"],
         ["run", "--jobs", "0"],
         ["run", "--seeds", str(10**23)],
-        ["run", "--seeds", str(2**32)],
+        ["run", "--seeds", str(2**63)],
         ["run", "--jobs", str(10**20)],
         ["run", "--timeout", "0"],
         ["run", "--timeout", "nan"],

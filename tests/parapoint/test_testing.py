@@ -107,6 +107,16 @@ class OfOneUnit(Good):
 
 
 @dataclass(frozen=True)
+class OfAllVertices(Good):
+    """Takes its unit from vertices of no face too, and rounds to single precision."""
+
+    def of_mesh(self, mesh):
+        low, size = mesh.vertices.min(axis=0), np.ptp(mesh.vertices)
+        inside = 1 + ((mesh.vertices - low) / size).astype(np.float32)
+        return Parameterization(inside[:, :2].astype(np.float64), mesh.faces)
+
+
+@dataclass(frozen=True)
 class Failing(Good):
     def of_mesh(self, mesh):
         if np.abs(mesh.vertices).max() > 1e3:
@@ -195,6 +205,7 @@ def test_honest_methods_pass():
         (Unseeded(), "another map under the same seed"),
         (OfOnePlace(), r"moved by 500000 times .* has another map: lengths or areas differ by"),
         (OfOneUnit(), "scaled by 1e-06, it has another map"),
+        (OfAllVertices(), "with a far vertex of no face, it has another map"),
         (Failing(), r"moved by 6e\+06 times .* cannot be mapped: too far"),
         (Meddling(), "changed the surface's vertices"),
         (Picky(), "on two components: refused, though it meets `requires`"),

@@ -1,5 +1,6 @@
 """The makers of atlases, and external programs."""
 
+import subprocess
 import sys
 
 import numpy as np
@@ -11,11 +12,14 @@ from baselines.tools.atlas import atlas, first_rows, joined_corners, row_numbers
 from baselines.tools.meshlab import matched_faces
 from baselines.tools.optional import Missing, optional
 from parapoint.errors import InputError
+from parapoint.files.mesh_writers import write_textured
 from parapoint.method import MissingError
 from parapoint.planar.domains import FlatteningError
 from parapoint.surfaces.areas import signed_areas
+from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.surface import Mesh
 from parapoint.testing import irregular_disk, sphere
+from parapoint.textures.checkerboard import checkerboard
 
 
 def mapped(spec, mesh):
@@ -159,6 +163,23 @@ def test_meshlab_triangles_are_one_chart_each():
     assert len(np.unique(result.charts())) == len(sphere().faces)
     with pytest.raises(FlatteningError, match="Failed to apply filter"):
         mapped("meshlab_triangles(page_size=8)", sphere())
+
+
+def test_a_filter_that_fails_leaves_meshlab_whole(tmp_path):
+    """A process that goes on reads texture coordinates without a crash."""
+    pytest.importorskip("pymeshlab")
+    write_textured(tmp_path / "map.obj", Charted(cube(), mapped("xatlas", cube())), checkerboard())
+    code = (
+        "import sys; from baselines import registry; from parapoint.testing import sphere\n"
+        "try: registry.method('meshlab_triangles(page_size=8)')[1].parameterize(sphere(), seed=0)\n"
+        "except RuntimeError: pass\n"
+        "import matplotlib.figure, pymeshlab; meshes = pymeshlab.MeshSet()\n"
+        "meshes.load_new_mesh(sys.argv[1]); read = meshes.current_mesh()\n"
+        "print(read.wedge_tex_coord_matrix().shape[0], read.texture_number())"
+    )
+    command = [sys.executable, "-c", code, tmp_path / "map.obj"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["36", "1"]
 
 
 def test_panic_of_uvunwrap_is_a_failure_of_the_method(monkeypatch):

@@ -70,7 +70,7 @@ def test_maps_and_report_come_back(stand_in):
     result = mapped("blender_smart_project", mesh)
     assert_array_equal(np.unique(result.charts()), [0, 1])
     # Blender is given the surface around the origin; rtol for float32.
-    given = in_unit(mesh.vertices)[mesh.faces[0], :2]
+    given = in_unit(mesh.vertices, mesh.faces)[mesh.faces[0], :2]
     assert_allclose(result.uv[result.corners[0]], given + 5, rtol=1e-5)
 
 

@@ -35,5 +35,5 @@ def test_place_and_unit_make_no_difference(name: str) -> None:
 def test_a_unit_for_float32() -> None:
     """Centred, and as large as said."""
     points = np.array([[5e5, 5e6, 0], [5e5 + 2, 5e6, 0], [5e5, 5e6 + 1, 0]])
-    inside = in_unit(points)
+    inside = in_unit(points, np.array([[0, 1, 2]]))
     assert np.linalg.norm(inside, axis=1).max() == pytest.approx(UNIT)

@@ -10,11 +10,13 @@ from PIL import Image
 
 from benchmarks.__main__ import main
 from benchmarks.commands.score import json_values, map_state, number, same_faces, worst_faces
+from benchmarks.metrics import evaluation
 from benchmarks.metrics.evaluation import evaluate
 from benchmarks.metrics.grades import GRADES
 from benchmarks.metrics.state import MapState
 from benchmarks.metrics.table import METRICS
-from parapoint import Mesh, console
+from parapoint import Mesh, PointCloud, console
+from parapoint.files.point_writers import write_points
 from parapoint.files.reading import read_parameterized
 
 # Two quads side by side; the second is drawn twice as long, in a chart of its own.
@@ -183,7 +185,7 @@ def test_a_rounded_reference_is_the_same_mesh(obj):
 @pytest.mark.parametrize(
     ("arrays", "words"),
     [
-        ({"points": np.zeros((9, 3))}, "has no array 'uv'"),
+        ({"points": np.zeros((9, 3))}, "has no uv for each point"),
         ({"points": np.zeros((9, 3)), "uv": np.zeros((8, 2))}, "8 uv rows"),
         ({"points": np.full((9, 3), np.nan), "uv": np.zeros((9, 2))}, "finite"),
         ({"points": np.zeros((3, 3)), "uv": np.zeros((3, 2))}, "4 are needed"),
@@ -193,6 +195,29 @@ def test_bad_point_maps_get_one_line(tmp_path, capsys, arrays, words):
     path = tmp_path / "cloud.npz"
     np.savez(path, **arrays)
     assert words in fault(capsys, path)
+
+
+@pytest.mark.parametrize("ending", [".ply", ".npz", ".obj"])
+@pytest.mark.parametrize("stray", [False, True])
+def test_points_are_scored_in_every_format_that_is_written(tmp_path, capsys, ending, stray):
+    """One map, one set of numbers; a stray row is not covered."""
+    points = np.random.default_rng(0).uniform(size=(60, 3)) * [1, 1, 0]
+    uv = points[:, :2] * [2.0, 1.0]
+    uv[7] = np.nan if stray else uv[7]
+    path = tmp_path / f"cloud{ending}"
+    write_points(path, PointCloud(points), uv)
+    _, out, _ = run(capsys, path, "--json")
+    values = json.loads(out)
+    assert values["local_quasi_conformal_mean"] == pytest.approx(2, abs=1e-6)
+    assert values["coverage"] == pytest.approx(59 / 60 if stray else 1)
+
+
+def test_the_heatmap_is_refused_before_any_work(obj, tmp_path, capsys, monkeypatch):
+    """A folder that is not there, a folder in the way, an input."""
+    monkeypatch.setattr(evaluation, "values", None)
+    (tmp_path / "folder.png").mkdir()
+    for name, words in {"none/x.png": "no such folder", "folder.png": "is a folder"}.items():
+        assert words in fault(capsys, obj, "--heatmap", tmp_path / name)
 
 
 def test_wrong_use_gets_one_line(obj, tmp_path, capsys):

@@ -42,3 +42,14 @@ def test_the_memory_of_a_container_is_its_limit(monkeypatch, limit, memory):
     monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(total=1000))
     monkeypatch.setattr(Path, "read_text", lambda _: limit)
     assert environment.memory() == memory
+
+
+def test_the_load_is_that_of_a_minute_over_the_processors(monkeypatch):
+    monkeypatch.setattr(environment.os, "getloadavg", lambda: (6.0, 1.0, 1.0))
+    monkeypatch.setattr(environment.os, "cpu_count", lambda: 4)
+    assert environment.load() == 1.5
+
+
+def test_a_system_that_does_not_tell_its_load_has_none(monkeypatch):
+    monkeypatch.delattr(environment.os, "getloadavg")
+    assert environment.load() is None

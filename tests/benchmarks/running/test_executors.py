@@ -48,7 +48,7 @@ class NAME:
         return Parameterization(surface.vertices[:, :2] + np.random.random(), surface.faces)
 """
 NUMBERS = itertools.count()
-TIMING = ("seconds", "cpu_seconds", "peak_memory_mb", "host", "run")
+TIMING = ("seconds", "cpu_seconds", "load", "peak_memory_mb", "host", "run")
 
 
 @pytest.fixture(autouse=True)

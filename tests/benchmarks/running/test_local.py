@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import random
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from benchmarks.cases.suites import Suite
-from benchmarks.running import local, runner, scratch
+from benchmarks.running import executors, local, runner, scratch
 from benchmarks.running.local import Local
 from benchmarks.running.tasks import MeasureJob, Outcome, Ready, Task, to_json
 from benchmarks.store.results import Store
@@ -20,6 +21,7 @@ PLUGIN = """
 import os, random, time
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 from typing import ClassVar
 
 import numpy as np
@@ -77,7 +79,7 @@ CURIOUS = Suite("trial", "A trial", ("cone",), ("curious",), (0, 2**32 - 1, 3))
 
 @pytest.fixture(scope="module")
 def curious(tmp_path_factory):
-    """Rows, by seed, of a method that looks around, and the summary of its run."""
+    """Rows, by seed, of a method that looks around."""
     folder = tmp_path_factory.mktemp("curious")
     (folder / "plugin.py").write_text(PLUGIN)
     with pytest.MonkeyPatch.context() as patch:
@@ -85,13 +87,13 @@ def curious(tmp_path_factory):
         patch.setattr(runner, "_measure", lambda *_: None)
         patch.setattr(local, "OUTPUT_KEPT", 600)
         plugins = [f"{os.path.relpath(folder)}/plugin.py:Curious"]
-        summary = runner.run(CURIOUS, folder / "out", plugins=plugins, jobs=1)
-    return {row.seed: row for row in Store(folder / "out").rows()}, summary
+        runner.run(CURIOUS, folder / "out", plugins=plugins, jobs=1)
+    return {row.seed: row for row in Store(folder / "out").rows()}
 
 
 def test_a_cell_has_its_own_empty_folder_and_set_variables(curious):
     for seed in (0, 2**32 - 1):
-        report = curious[0][seed].report
+        report = curious[seed].report
         assert report["hashes"] == "0"
         assert report["threads"] == "3"
         assert report["is_temporary_folder"] is True
@@ -102,13 +104,13 @@ def test_a_cell_has_its_own_empty_folder_and_set_variables(curious):
 
 def test_generators_that_a_method_forgot_to_seed_are_seeded(curious):
     for seed in (0, 2**32 - 1):
-        report = curious[0][seed].report
+        report = curious[seed].report
         assert report["random"] == random.Random(seed).random()  # noqa: S311  not for secrets
         assert report["numpy"] == np.random.RandomState(seed).random_sample()
 
 
 def test_what_is_printed_is_kept_of_the_cell_alone_and_bounded(curious):
-    rows, _ = curious
+    rows = curious
     assert rows[0].output == rows[2**32 - 1].output == ""
     assert 500 < len(rows[3].output) <= 600
     assert rows[3].output.endswith("ValueError: no")
@@ -122,11 +124,20 @@ def test_the_output_of_the_cell_before_does_not_count(tmp_path, monkeypatch):
     assert row.output.startswith("seed 3\n")
 
 
-def test_the_time_of_methods_is_theirs_or_that_of_the_whole_cell_where_they_fail(curious):
-    rows, summary = curious
-    own = sum(row.seconds for row in rows.values() if row.status == "ok")
-    assert rows[3].seconds is None
-    assert own < summary.method_seconds < summary.seconds
+def test_the_time_of_methods_is_theirs_or_that_of_the_whole_cell_where_they_fail(
+    tmp_path, monkeypatch
+):
+    outcomes = [Outcome("failed", seconds=1.0, took=9.0), Outcome("failed", took=4.0)]
+
+    class Told(Local):
+        def run(self, tasks, _):
+            for task, outcome in zip(tasks, outcomes, strict=bool(tasks)):
+                task.ended(outcome, Path())
+
+    monkeypatch.setattr(executors, "Local", Told)
+    suite = Suite("trial", "A trial", ("cone",), ("tutte",), (0, 1))
+    summary = runner.run(suite, tmp_path, jobs=2)
+    assert summary.method_seconds == (1 + 4) / 2  # two at a time
 
 
 def test_a_process_that_a_method_forks_counts_and_writes_no_map(tmp_path, monkeypatch):
@@ -150,7 +161,8 @@ class FakeSlot:
         self.reply, self.printed = bytearray(), bytearray()
         self.ready, self.task, self.folder, self.started = False, None, None, 0.0
         self.begun: list[Task] = []
-        self.time_limit = 1e9
+        self.time_limit, self.number = 1e9, 0
+        self.process = SimpleNamespace(pid=0)
 
     hear, drain = local._Slot.hear, local._Slot.drain
 
@@ -187,7 +199,7 @@ def test_a_supervisor_does_tasks_of_its_own_modules_only(hands):
         if not slot.ready:
             slot.says(to_json(Ready()))
             hands._listen()
-        slot.says(to_json(Outcome("ok")))
+        slot.says(to_json(Outcome("ok", number=hands.sent)))
         hands._listen()
     assert len(hands.slots) == 2
     assert [outcome.status for outcome in outcomes] == ["ok"] * 3
@@ -222,14 +234,54 @@ def test_a_supervisor_that_answers_nonsense_costs_its_task_and_is_replaced(hands
     assert len(hands.slots) == 1
 
 
-def test_a_failure_of_the_machine_ends_the_run_in_one_line(hands):
+def test_the_answer_to_another_task_is_none(hands):
     outcomes: list[Outcome] = []
     hands._assign(task(outcomes))
     (slot,) = hands.slots
-    slot.says(to_json(Ready()) + to_json(Outcome("failed", "map.npz: no space left", fatal=True)))
-    with pytest.raises(InputError, match=r"^map\.npz: no space left; earlier results are intact"):
-        hands._listen()
+    slot.says(
+        to_json(Ready()) + to_json(Outcome("ok", number=0)) + to_json(Outcome("ok", number=2))
+    )
+    hands._listen()
     assert outcomes == []
+    slot.says(to_json(Outcome("failed", number=1)) + to_json(Outcome("ok", number=1)))
+    hands._listen()
+    assert [outcome.status for outcome in outcomes] == ["failed"]
+
+
+def test_a_line_without_an_end_costs_the_task_and_no_memory(hands, monkeypatch):
+    outcomes: list[Outcome] = []
+    monkeypatch.setattr(local, "LONGEST_LINE", 1000)
+    hands._assign(task(outcomes))
+    (slot,) = hands.slots
+    slot.says(to_json(Ready()))
+    hands._listen()
+    slot.says(b"x" * 1001)
+    hands._listen()
+    assert "answered nonsense: a line is too long" in outcomes[0].reason
+
+
+def test_a_supervisor_that_ends_between_two_tasks_is_replaced(hands):
+    outcomes: list[Outcome] = []
+    hands._assign(task(outcomes))
+    (slot,) = hands.slots
+    slot.says(to_json(Ready()))
+    hands._listen()
+    slot.says(to_json(Outcome("ok", number=1)))
+    hands._listen()
+    hands._lost(slot, "killed")
+    assert not hands.slots
+    assert [outcome.status for outcome in outcomes] == ["ok"]
+
+
+def test_a_supervisor_that_never_starts_ends_the_run_in_one_line(hands):
+    hands._assign(task([]))
+    for _ in range(local.MOST_STARTS - 1):
+        (slot,) = hands.slots
+        hands._lost(slot, "")
+    (slot,) = hands.slots
+    slot.printed += b"no such module\n"
+    with pytest.raises(InputError, match="no process can be started for a cell: no such module"):
+        hands._lost(slot, "")
 
 
 def test_the_memory_of_the_machine_is_shared_by_the_jobs(monkeypatch):

@@ -183,7 +183,7 @@ def row_of(faulty: tuple[Summary, Store], method: str) -> ResultRow:
         ("quitter", "failed", "ended the process (exit status 0) with no result"),
         ("exiter", "failed", "SystemExit: enough"),
         ("suicide", "failed", "killed by SIGKILL (killed)"),
-        ("patricide", "failed", "killed the process that watched over it"),
+        ("patricide", "failed", "the process that watched over it was killed"),
         ("refused", "out_of_memory", "MemoryError"),
         ("sleeper", "timeout", "not done within the limit of 3 s"),
         ("printer", "failed", "ValueError: two lines"),
@@ -280,6 +280,7 @@ def test_every_cell_has_its_resources_and_an_ok_one_its_map(faulty):
     assert row.params == {"step": 1}
     assert 0 <= row.seconds < 5
     assert 0 <= row.cpu_seconds < 5
+    assert 0 <= row.load < 1000
     assert 20 < row.peak_memory_mb < 200
     surface, result = store.surface(row), store.result(row)
     assert (result.uv == surface.vertices[:, :2]).all()

@@ -38,7 +38,7 @@ MEASURE = MeasureJob(
 OUTCOME = Outcome(
     "failed",
     "the reason \ud800 \u2028",  # a lone surrogate: the name of a file may hold one
-    fatal=True,
+    number=3,
     preprocessing="cut",
     seconds=0.1,
     peak_memory_mb=3.0,
@@ -76,7 +76,7 @@ def test_only_the_messages_that_are_expected_are_read():
         ({"status": "fine"}, "Outcome.status cannot be 'fine'"),
         ({"status": ["ok"]}, "Outcome.status"),
         ({"reason": None}, "Outcome.reason cannot be None"),
-        ({"fatal": 1}, "Outcome.fatal"),
+        ({"number": "1"}, "Outcome.number"),
         ({"seconds": "1"}, "Outcome.seconds"),
         ({"seconds": True}, "Outcome.seconds"),
         ({"seconds": 10**400}, "Outcome.seconds"),

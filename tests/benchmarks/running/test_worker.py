@@ -19,7 +19,8 @@ from benchmarks.running.tasks import Outcome, Prepared, Ready, RunJob, from_json
 from benchmarks.store.archives import read_map, read_surface
 from benchmarks.store.measuring import measured
 from benchmarks.store.results import Store
-from benchmarks.store.rows import SOURCE_CHANGED
+from benchmarks.store.rows import MACHINE, SOURCE_CHANGED
+from parapoint import sources
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization
 from parapoint.surfaces.surface import Mesh, PointCloud
 from parapoint.testing import sample_surfaces
@@ -218,8 +219,8 @@ def test_a_map_that_cannot_be_written_is_the_machine_s_fault(tmp_path, monkeypat
     monkeypatch.setattr(cell, "write_arrays", full)
     with Path(os.devnull).open("wb") as ahead:
         outcome = cell.run(job, ahead.fileno())
-    assert outcome.fatal
-    assert outcome.reason == f"{tmp_path}/map.npz: No space left on device"
+    assert outcome.status == "failed"
+    assert outcome.reason == f"{MACHINE}OSError: [Errno 28] No space left on device"
 
 
 def test_a_cell_whose_method_has_changed_is_told_so(tmp_path):
@@ -235,3 +236,16 @@ def test_a_cell_whose_method_has_changed_is_told_so(tmp_path):
         memory_limit=1e9,
     )
     assert cell.run(job, -1) == Outcome("failed", SOURCE_CHANGED)
+
+
+@pytest.mark.parametrize("spec", ["tutte", "slim(iterations=5)"])
+def test_a_supervisor_parses_the_sources_of_a_method_for_all_its_cells(spec):
+    sources.imported.cache_clear()
+    worker._parse.__wrapped__(spec)
+    parsed = sources.imported.cache_info().misses
+    registry.source_hash(registry.method(spec)[1])
+    assert sources.imported.cache_info().misses == parsed > 0
+
+
+def test_a_method_that_is_not_built_in_is_parsed_in_its_cells():
+    worker._parse.__wrapped__("mine(step=1)")

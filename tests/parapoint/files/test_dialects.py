@@ -5,6 +5,7 @@ import gzip
 import json
 import struct
 from collections.abc import Sequence
+from contextvars import copy_context
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from parapoint import console
+from parapoint.cli import parapoint
 from parapoint.errors import InputError
 from parapoint.files.polygons import triangle_rows
 from parapoint.files.reading import read_parameterized, read_surface
@@ -280,3 +283,20 @@ def test_small_files_that_decode_to_much_are_refused(tmp_path: Path) -> None:
     path = glb(tmp_path, nodes=nodes, meshes=[{"primitives": primitives}])
     with pytest.raises(InputError, match="bytes that decode to"):
         read_surface(path)
+
+
+def test_memory_lifts_the_bound_on_what_files_decode_to(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Zeros a thousand times as large as their file."""
+    np.savez_compressed(tmp_path / "zeros.npz", points=np.zeros((3_000_000, 3)))
+    command = ["unwrap", str(tmp_path / "zeros.npz"), "--out", str(tmp_path / "a.ply")]
+    said = []
+    for options in ([], ["--memory", "1"], ["--memory", "-1"]):
+        with pytest.raises(SystemExit) as end:
+            copy_context().run(console.run, parapoint, [*command, *options])
+        assert end.value.code == 2
+        said.append(capsys.readouterr().err)
+    assert "or allow --memory 1 GB" in said[0]
+    assert "1 distinct points; a fit needs at least 100" in said[1]
+    assert "--memory must be" in said[2]

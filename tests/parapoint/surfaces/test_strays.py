@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from parapoint import ComputedMap, PointCloud
-from parapoint.surfaces.strays import stray_points
+from parapoint.surfaces.strays import far_from, stray_points
 from parapoint.surfaces.surface import FloatArray
 
 
@@ -57,6 +57,19 @@ def test_components_and_small_clouds_are_no_strays() -> None:
     assert not stray_points(np.concatenate([dome(), dome(400) + np.array([50, 0, 0])])).any()
     assert not stray_points(1e3 * np.eye(4)[:, :3]).any()
     assert not stray_points(np.ones((9, 3))).any()
+
+
+@pytest.mark.parametrize("radii", [30, 1e3, 1e6, 1e200])
+def test_a_fitted_model_maps_strays_nowhere(radii: float) -> None:
+    """Those of other points than the fitted ones; points near the surface stay."""
+    points = dome(800)
+    model = ComputedMap(points=400).fit(points)
+    near = 1.2 * points[400:]
+    uv = model.transform(np.concatenate([near, flying(3, radii), points]))
+    assert_array_equal(np.isnan(uv).all(axis=1), (np.arange(1203) >= 400) & (np.arange(1203) < 403))
+    assert_array_equal(uv[403:], model.transform(points))
+    assert not far_from(points, np.zeros((1, 3)))[0]
+    assert not np.isnan(model.transform(points[:1])).any()
 
 
 def test_a_map_is_as_without_its_strays(caplog: pytest.LogCaptureFixture) -> None:

@@ -4,6 +4,7 @@ import pytest
 
 from reports.contents import contents
 from reports.tables.formats import comma_separated
+from reports.tables.notes import load_notes
 from reports.tables.suites import comparison, conformality, failures, supplement
 
 from ..conftest import DEVIL, HAND, HOSTILE, NEFERTITI, Writer, flat, sheet
@@ -126,3 +127,22 @@ def test_fractions_are_per_cent_in_the_comparison_and_so_in_its_csv(tmp_path):
     assert made.cells[0][0][0].text == "flipped faces % ↓"
     assert made.cells[0][0][2].text == "1.25"
     assert comma_separated(made).splitlines()[1].split(",")[2] == "1.25"
+
+
+def test_a_busy_machine_is_told_beside_the_times(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for case, load in (("a", 0.9), ("b", 3.24), ("c", None)):
+            writer.cell(case, sheet(), "lscm", {}, result=flat(sheet()), load=load, cpu_seconds=0.2)
+    suite = contents(tmp_path)[0]
+    (note,) = load_notes(suite)
+    assert note.startswith("The machine was busy during 1 of 3 cells (up to 3.2 processes")
+    assert all(note in made.notes for made in (supplement(suite), comparison(suite)))
+    times = {
+        row["name"]: row["mean"] for row in comparison(suite, ["seconds", "cpu_seconds"]).blocks[1]
+    }
+    assert times == pytest.approx({"cpu_seconds": 0.2})
+
+
+def test_a_machine_with_nothing_else_to_do_needs_no_note(results):
+    assert load_notes(contents(results)[0]) == []
