@@ -37,7 +37,7 @@ SCALES = {
 }
 """Title, colours and range, and the ends in words, of each distortion in the viewer."""
 
-ASSETS = ("style.css", "page.js", "viewer.js")
+ASSETS = ("style.css", "page.js", "unpack.js", "shaders.js", "viewer.js")
 """What all pages share."""
 
 
