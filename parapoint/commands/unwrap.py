@@ -60,7 +60,7 @@ def unwrap(
     file written as OBJ keeps all its lines but for the UVs; without materials of its own it gets a
     checkerboard. Components are mapped one by one; with --components largest only that one is
     written. Branches of the seam grow where each lowers the energy (symmetric Dirichlet, 4 at
-    least) by --seam-price (0.1) for a length of the square root of the area; --max-distortion adds
+    least) by --seam-price (1) for a length of the square root of the area; --max-distortion adds
     to them until the energy is as low, within --time-budget.
 
     Of a cloud FILE.glb is a mesh of it, with its colours baked into a texture (a checkerboard where

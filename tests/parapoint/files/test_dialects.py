@@ -81,6 +81,11 @@ def test_packed_files_are_refused_by_the_name_of_the_tool(
         "2\n1.5 2.25 -3\n4 5.5 6\n",
         "1\n1.5 2.25 -3\n1\n4 5.5 6\n",
         "1,50e0 2,25 -3\n4 5,5 6\n",
+        '"1,5";"2,25";"-3"\n"4,0";"5,5";"6,0"\n',
+        "Point_ID X Y Z\n7 1.5 2.25 -3\n9 4 5.5 6\n",
+        "z,y,x\n-3,2.25,1.5\n6,5.5,4\n",
+        "# intensity x y z\n9 1.5 2.25 -3\n8 4 5.5 6\n",
+        "//R;X;Y;Z\n9;1,5;2,25;-3\n8;4,0;5,5;6,0\n",
     ],
 )
 @pytest.mark.parametrize("ending", [".xyz", ".pts"])
@@ -95,6 +100,7 @@ def test_numbers_in_text(tmp_path: Path, text: str, ending: str) -> None:
         ("1,234.5 2,345.6 3,456.7\n", [1234.5, 2345.6, 3456.7]),
         ("1.234,5 2.345,6 3.456,7\n", [1234.5, 2345.6, 3456.7]),
         ("63,696 21,583 0,041\n", [63.696, 21.583, 0.041]),
+        ("1,234,567.5 2,345.25 3,000\n", [1234567.5, 2345.25, 3000]),
         ("1,2,3\n", [1, 2, 3]),
         ("1,-5,2,0,0,1\n", [1, -5, 2]),
         ("1.0,2.0,3.0 255,0,0\n", [1, 2, 3]),
@@ -104,6 +110,16 @@ def test_numbers_in_text(tmp_path: Path, text: str, ending: str) -> None:
 def test_commas_that_can_be_told(tmp_path: Path, text: str, point: Sequence[float]) -> None:
     """By what stands beside them."""
     assert_allclose(of_file(tmp_path, "a.xyz", text), [point])
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_numbers_of_rows_are_no_coordinates(tmp_path: Path, first: int, caplog: Any) -> None:
+    """As total stations write them; a grid whose first column counts is none."""
+    points = np.random.default_rng(0).normal(size=(5, 3))
+    rows = [f"{k + first} {x} {y} {z}\n" for k, (x, y, z) in enumerate(points)]
+    assert_allclose(of_file(tmp_path, "a.xyz", "".join(rows)), points)
+    assert "numbers the rows" in caplog.text
+    assert_allclose(of_file(tmp_path, "b.xyz", "0 0 5 1\n1 0 5 1\n2 0 5 1\n")[:, 0], [0, 1, 2])
 
 
 @pytest.mark.parametrize("text", ["1,5,2,5,3,5\n", "1,5,2,5,3,5,7\n", "1,5,2 3,5\n"])
@@ -300,3 +316,11 @@ def test_memory_lifts_the_bound_on_what_files_decode_to(
     assert "or allow --memory 1 GB" in said[0]
     assert "1 distinct points; a fit needs at least 100" in said[1]
     assert "--memory must be" in said[2]
+
+
+def test_stl_with_notes_behind_its_triangles(tmp_path: Path) -> None:
+    """As some tools append; a text that says solid is a text."""
+    triangle = np.array([[0, 0, 1], [0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4").tobytes() + bytes(2)
+    data = bytes(80) + struct.pack("<I", 1) + triangle
+    for notes in (b"", b"colour=red", bytes(60)):
+        assert len(of_file(tmp_path, "a.stl", data + notes)) == 3
