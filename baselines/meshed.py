@@ -15,10 +15,10 @@ from baselines.tools.meshlab import failed, pymeshlab
 from baselines.tools.xatlas_charts import Xatlas
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
+from parapoint.planar.domains import FlatteningError
 from parapoint.surfaces.parameterization import Charted, Parameterization, PointParameterization
 from parapoint.surfaces.preparation import prepared
 from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, PointCloud, Surface
-from parapoint.unwrapping.domains import FlatteningError
 
 FLATTENINGS: dict[str, Xatlas | LSCM | SLIM] = {"xatlas": Xatlas(), "lscm": LSCM(), "slim": SLIM()}
 

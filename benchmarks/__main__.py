@@ -109,7 +109,8 @@ def _seeds(_: click.Context, __: click.Parameter, text: str | None) -> list[int]
 @click.option(
     "--memory",
     type=float,
-    help="GB a cell may hold.  [default: four fifths of the machine's, / jobs]",
+    help="GB a cell may hold, and a packed file decode to.  [default: four fifths of the "
+    "machine's, / jobs; 0.07 of a file]",
 )
 @click.option("--out", type=click.Path(path_type=Path), default="results", show_default=True)
 @click.option(
@@ -133,6 +134,10 @@ def run(
     """
     from benchmarks.cases import suites
     from benchmarks.commands.display import BAD
+    from parapoint.files.decoding import allow
+
+    if options["memory"] is not None:
+        allow(options["memory"] * 1e9)
 
     if suite is None and cases is not None:
         chosen = suites.Suite(

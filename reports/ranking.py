@@ -30,6 +30,8 @@ TIME_TIE = 0.05
 """Relative difference up to which two times are equal: a machine repeats itself no better."""
 TIE = 1e-3
 """Relative difference up to which two values of another metric are equal."""
+COLLAPSED_FLAG = "†"
+"""Stands beside the angles of a map that shrinks a part of the surface to nothing."""
 MOST_LEFT_OUT = 0.1
 """Share of a method's maps that may be unfit for a rank before its means take no part in ranks."""
 
@@ -56,6 +58,17 @@ def may_rank(found: str | None, *, angles: bool) -> bool:
         angles: whether the column reads angles alone.
     """
     return found != "broken" and (angles or found != "collapsed")
+
+
+def flagged(text: str, found: str | None, *, angles: bool) -> str:
+    """A printed value with COLLAPSED_FLAG where a collapsed map is ranked nevertheless: by angles.
+
+    Args:
+        text: the value as printed.
+        found: the grade of its map.
+        angles: whether the column reads angles alone.
+    """
+    return f"{text} {COLLAPSED_FLAG}" if angles and found == "collapsed" else text
 
 
 def means_may_rank(found: Sequence[str], *, angles: bool) -> bool:

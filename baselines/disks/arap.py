@@ -9,19 +9,19 @@ from typing import ClassVar
 import igl
 import numpy as np
 
-from parapoint.surfaces.parameterization import Parameterization, TracePoint
-from parapoint.surfaces.surface import Surface
-from parapoint.unwrapping.domains import (
+from parapoint.planar.domains import (
     check_iterations,
     check_triangles,
     domain,
     finite,
     frames,
     is_kept,
-    signed_areas,
     singular_values,
 )
-from parapoint.unwrapping.tutte import tutte
+from parapoint.planar.tutte import tutte
+from parapoint.surfaces.areas import signed_areas
+from parapoint.surfaces.parameterization import Parameterization, TracePoint
+from parapoint.surfaces.surface import Surface
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,7 @@ from typing import ClassVar
 import igl
 import numpy as np
 
-from parapoint.surfaces.parameterization import Parameterization
-from parapoint.surfaces.surface import FloatArray, Surface
-from parapoint.unwrapping.domains import (
+from parapoint.planar.domains import (
     arc_lengths,
     check_triangles,
     closed_holes,
@@ -18,6 +16,8 @@ from parapoint.unwrapping.domains import (
     finite,
     scaled,
 )
+from parapoint.surfaces.parameterization import Parameterization
+from parapoint.surfaces.surface import FloatArray, Surface
 
 
 @dataclass(frozen=True)

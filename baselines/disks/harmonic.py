@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import igl
 
+from parapoint.planar.domains import check_triangles, circle, domain, scaled
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Surface
-from parapoint.unwrapping.domains import check_triangles, circle, domain, scaled
 
 
 @dataclass(frozen=True)

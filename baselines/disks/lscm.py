@@ -8,9 +8,9 @@ from typing import ClassVar
 import igl
 import numpy as np
 
+from parapoint.planar.domains import check_triangles, domain, far_pair, scaled
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Surface
-from parapoint.unwrapping.domains import check_triangles, domain, far_pair, scaled
 
 
 @dataclass(frozen=True)

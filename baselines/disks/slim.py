@@ -9,9 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from parapoint.errors import InputError
-from parapoint.surfaces.parameterization import Parameterization, TracePoint
-from parapoint.surfaces.surface import FloatArray, IntArray, Surface
-from parapoint.unwrapping.domains import (
+from parapoint.planar.domains import (
     Domain,
     FlatteningError,
     check_iterations,
@@ -19,11 +17,13 @@ from parapoint.unwrapping.domains import (
     domain,
     frames,
     is_kept,
-    signed_areas,
     singular_values,
 )
-from parapoint.unwrapping.energies import DENSITIES, stepper
-from parapoint.unwrapping.tutte import tutte
+from parapoint.planar.energies import DENSITIES, stepper
+from parapoint.planar.tutte import tutte
+from parapoint.surfaces.areas import signed_areas
+from parapoint.surfaces.parameterization import Parameterization, TracePoint
+from parapoint.surfaces.surface import FloatArray, IntArray, Surface
 
 NUDGE = 1e-5
 """Corners move so far for a difference quotient of the energy, in typical edges."""
@@ -132,7 +132,7 @@ def is_minimum(
     Args:
         name: key of DENSITIES.
         weight: (F,) share of each triangle in the 3D area.
-        frame: (F, 2, 2) the triangles in 3D, as `parapoint.unwrapping.domains.frames` gives them.
+        frame: (F, 2, 2) the triangles in 3D, as `parapoint.planar.domains.frames` gives them.
         uv: (V, 2) the map.
         faces: (F, 3) rows of `uv`.
     """

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from parapoint.planar.domains import domain
+from parapoint.planar.tutte import tutte
+from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Surface
-from parapoint.unwrapping.domains import domain, signed_areas
-from parapoint.unwrapping.tutte import tutte
 
 
 @dataclass(frozen=True)

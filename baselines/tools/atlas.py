@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
+from parapoint.planar.domains import FlatteningError
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
-from parapoint.unwrapping.domains import FlatteningError
 
 
 def atlas(

@@ -15,10 +15,10 @@ import numpy as np
 
 from baselines.tools.atlas import joined_corners
 from parapoint.method import MissingError, UnsupportedError
+from parapoint.planar.domains import FlatteningError, check_iterations, domain, scaled
 from parapoint.surfaces.frame import in_unit
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, Surface
-from parapoint.unwrapping.domains import FlatteningError, check_iterations, domain, scaled
 
 INTERPRETER = "PARAPOINT_BLENDER"
 """Environment variable that names a Python interpreter which can import bpy."""

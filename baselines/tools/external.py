@@ -15,9 +15,9 @@ import numpy as np
 from parapoint.errors import InputError
 from parapoint.files.reading import read_parameterized
 from parapoint.method import MissingError, UnsupportedError
+from parapoint.planar.domains import FlatteningError
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh, Surface
-from parapoint.unwrapping.domains import FlatteningError
 
 
 @dataclass(frozen=True)

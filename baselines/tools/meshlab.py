@@ -10,10 +10,10 @@ import numpy as np
 from baselines.tools.atlas import joined_corners, row_numbers
 from baselines.tools.optional import optional
 from parapoint.method import UnsupportedError
+from parapoint.planar.domains import FlatteningError, check_triangles, domain, scaled
 from parapoint.surfaces.frame import in_unit
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, Surface
-from parapoint.unwrapping.domains import FlatteningError, check_triangles, domain, scaled
 
 pymeshlab = optional(
     "pymeshlab", "pip install pymeshlab, and the system library libGL.so.1 (Debian: libgl1)"

@@ -12,10 +12,10 @@ from baselines.tools.atlas import joined_corners
 from baselines.tools.optional import optional
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
+from parapoint.planar.domains import FlatteningError
 from parapoint.surfaces.frame import in_unit
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh, Surface
-from parapoint.unwrapping.domains import FlatteningError
 
 
 @cache

@@ -10,10 +10,10 @@ import numpy as np
 from baselines.tools.atlas import atlas
 from baselines.tools.optional import optional
 from parapoint.method import UnsupportedError
+from parapoint.planar.domains import FlatteningError
 from parapoint.surfaces.frame import UNIT, Frame, in_unit
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh, Surface
-from parapoint.unwrapping.domains import FlatteningError
 
 uvunwrap = optional("uvunwrap", "pip install uvunwrap")
 

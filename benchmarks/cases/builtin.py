@@ -228,3 +228,14 @@ BUILTIN: dict[str, Callable[[], Mesh]] = {
     "torus": torus,
 }
 """The built-in cases: name -> a function that makes the mesh."""
+
+
+def finger() -> Mesh:
+    """A disk with a long finger at its middle, which maps starve where no seam leads to it."""
+    points, faces = disk_points(14)
+    away = np.linalg.norm(points, axis=1)
+    near = away < 0.5
+    radius = np.where(near, np.minimum(away, 0.15), 0.15 + (away - 0.5) * 1.7)
+    height = np.where(near, 6 * (0.5 - away), 0)
+    plane = points * (radius / np.maximum(away, 1e-9))[:, None]
+    return Mesh(np.column_stack([plane, height]), faces)

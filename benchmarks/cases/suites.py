@@ -41,6 +41,7 @@ PAPER = "parapoint(preset=paper, time_budget=150)"
 LEARNED = "parapoint(preset=learned, time_budget=150)"
 PAPER_SHORT = "parapoint(preset=paper, points=2048, iterations=300, subset=256, all_from=0.99)"
 COMPUTED = "computed(time_budget=120)"
+COMPUTED_CONFORMAL = "computed(distortion=conformal, time_budget=120)"
 # The budget of PAPER for the neural maps of other authors.
 EQUAL = "points=4096, subset=256, time_budget=150"
 
@@ -125,6 +126,7 @@ SUITES: dict[str, Suite] = {
                 PAPER,
                 LEARNED,
                 COMPUTED,
+                COMPUTED_CONFORMAL,
             ),
         ),
         Suite("disk", "Disks", members("disk"), (*MESH_METHODS, COMPUTED)),
@@ -191,7 +193,7 @@ SUITES: dict[str, Suite] = {
             "quality",
             "The computed map on ten models, three seeds",
             QUALITY_CASES,
-            ("lscm", ISOMETRIC, CONFORMAL, COMPUTED),
+            ("lscm", ISOMETRIC, CONFORMAL, COMPUTED, COMPUTED_CONFORMAL),
             (0, 1, 2),
         ),
     ]

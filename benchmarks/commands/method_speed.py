@@ -20,8 +20,8 @@ from scipy import sparse
 
 from baselines import registry
 from benchmarks.commands.metric_speed import speed_map
-from parapoint.computed.bijection import LARGE
 from parapoint.method import Method, MissingError
+from parapoint.planar.scaffold import LARGE
 from parapoint.surfaces.frame import in_unit
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.preparation import prepared

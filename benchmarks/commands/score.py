@@ -17,6 +17,7 @@ from benchmarks.metrics.grades import BOUNDS, grade
 from benchmarks.metrics.metric import GROUPS, WITHOUT_SPANNING
 from benchmarks.metrics.state import MapState
 from benchmarks.metrics.table import METRICS
+from parapoint.commands.memory import memory_option
 from parapoint.errors import InputError
 from parapoint.files.reading import faults_of, has_faces, read_parameterized, read_point_map
 from parapoint.files.targets import checked_picture
@@ -37,6 +38,7 @@ WIDTH = 160
 @click.option(
     "--reference", type=click.Path(path_type=Path), help="Another map of the same faces: its UV."
 )
+@memory_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object {metric: value}.")
 @click.option(
     "--heatmap", type=click.Path(path_type=Path), metavar="OUT.png", help="Draw the distortion."

@@ -186,16 +186,26 @@ def _area_log_ratio(point_map: PointMap) -> FloatArray:
 
 
 def _local_ratio(point_map: PointMap) -> FloatArray:
-    """(P,) local area, sigma1 sigma2, over its mean; nan where the neighbourhood spans no plane."""
+    """(P,) local area, sigma1 sigma2, over its mean.
+
+    nan where the neighbourhood spans no plane, or the map tears in it: the two sides of a seam lie
+    far apart in UV, and the area between them would make all others small.
+    """
     larger, smaller = point_map.singular_values.T
-    area = np.where(larger > 0, larger * smaller, np.nan)
-    total = np.nanmean(area) if (larger > 0).any() else 0.0
+    known = (larger > 0) & ~point_map.spanning
+    area = np.where(known, larger * smaller, np.nan)
+    total = np.nanmean(area) if known.any() else 0.0
     return area / total if total > 0 else np.full(len(area), np.nan)
 
 
 def starved_point_fraction(point_map: PointMap) -> float:
-    """Fraction of points whose local area is below a quarter of the mean."""
-    return float((_local_ratio(point_map) < STARVED).mean())
+    """Share of the points with a local area below a quarter of the mean; 1 without any.
+
+    Points where the map tears are left out.
+    """
+    ratio = _local_ratio(point_map)
+    known = np.isfinite(ratio)
+    return float((ratio[known] < STARVED).mean()) if known.any() else 1.0
 
 
 def point_part_area_ratio_min(point_map: PointMap) -> float:

@@ -68,7 +68,7 @@ def perform(job: Job, send: int) -> Never:
     own = os.getpid()
     seed = job.seed if isinstance(job, RunJob) else 0
     random.seed(seed)
-    np.random.seed(seed % 2**32)  # noqa: NPY002  for methods that draw from the global one
+    np.random.seed(seed)  # noqa: NPY002  for methods that draw from the global one
     try:
         outcome = _done(job, send)
     except BaseException as error:  # noqa: BLE001  whatever a method raises is a row

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from parapoint.commands.memory import memory_option
 from parapoint.commands.output import TEXTURE
 from parapoint.errors import InputError
 from parapoint.files.png import png
@@ -34,6 +35,7 @@ from parapoint.textures.placing import Placing
 @click.option("--texture", type=int, default=TEXTURE, show_default=True, help="Texels a side.")
 @click.option("--margin", type=int, default=MARGIN, show_default=True, help="In texels.")
 @click.option("--force", is_flag=True, help="Replace files of yours that are in the way.")
+@memory_option
 @click.option("--json", "as_json", is_flag=True, help="Print the report as one JSON object.")
 def bake(
     model: str,

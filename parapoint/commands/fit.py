@@ -10,6 +10,7 @@ import click
 
 from parapoint import saving
 from parapoint.commands.fitting import estimator_of, fitted, summary
+from parapoint.commands.memory import memory_option
 from parapoint.files.reading import read_surface
 
 
@@ -21,7 +22,10 @@ from parapoint.files.reading import read_surface
 @click.option("--iterations", type=int, help="Training steps.")
 @click.option("--subset", type=int, help="Points of a training step, before the last take all.")
 @click.option("--time-budget", type=float, metavar="S", help="Seconds of fitting at most.")
-@click.option("--distortion", help="Training: conformal, or isometric in its place.")
+@click.option(
+    "--distortion",
+    help="What the map keeps: conformal, balanced (computed alone; its default) or isometric.",
+)
 @click.option("--distortion-weight", type=float, help="The paper has 1e-4 for complex shapes.")
 @click.option("--eigenvalues", help="Training: singular, or gram, as the paper is read.")
 @click.option("--branches", help="Training: both, or one: 3d (3D-2D-3D) or 2d (2D-3D-2D).")
@@ -34,6 +38,7 @@ from parapoint.files.reading import read_surface
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--device", help="Training: auto, cpu or cuda.")
 @click.option("--threads", type=int, help="Training: processor threads.")
+@memory_option
 @click.option("--json", "as_json", is_flag=True, help="Print the report as one JSON object.")
 def fit(surface: str, out: str, preset: str, as_json: bool, **settings: Any) -> None:
     """Find the map of a mesh or a point cloud and save it in DIR.

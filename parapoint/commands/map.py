@@ -6,6 +6,7 @@ import json
 
 import click
 
+from parapoint.commands.memory import memory_option
 from parapoint.commands.output import target, write
 from parapoint.files.reading import read_surface
 
@@ -16,6 +17,7 @@ from parapoint.files.reading import read_surface
 @click.option("--out", required=True, metavar="FILE", help="FILE.obj, .ply or .npz.")
 @click.option("--device", default="auto", show_default=True, help="auto, cpu or cuda.")
 @click.option("--force", is_flag=True, help="Replace files of yours that are in the way.")
+@memory_option
 @click.option("--json", "as_json", is_flag=True, help="Print the report as one JSON object.")
 def map_(model: str, surface: str, out: str, device: str, *, force: bool, as_json: bool) -> None:
     """Apply the model in DIR to other points of its surface, or to a mesh of it.

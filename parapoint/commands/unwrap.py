@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from parapoint.commands.fitting import estimator_of, fitted, summary
+from parapoint.commands.memory import memory_option
 from parapoint.commands.output import TEXTURE, preview_target, target, write
 from parapoint.errors import InputError
 from parapoint.files.reading import Polygons, read_polygons
@@ -36,6 +37,7 @@ from parapoint.textures.baking import check_size
 @click.option("--preview", metavar="FILE", help="FILE.png: the surface beside its layout.")
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--force", is_flag=True, help="Replace files of yours that are in the way.")
+@memory_option
 @click.option("--json", "as_json", is_flag=True, help="Print the report as one JSON object.")
 def unwrap(
     surface: str,
@@ -58,7 +60,7 @@ def unwrap(
     file written as OBJ keeps all its lines but for the UVs; without materials of its own it gets a
     checkerboard. Components are mapped one by one; with --components largest only that one is
     written. Branches of the seam grow where each lowers the energy (symmetric Dirichlet, 4 at
-    least) by --seam-price (0.1) for a length of the square root of the area; --max-distortion adds
+    least) by --seam-price (1) for a length of the square root of the area; --max-distortion adds
     to them until the energy is as low, within --time-budget.
 
     Of a cloud FILE.glb is a mesh of it, with its colours baked into a texture (a checkerboard where

@@ -17,15 +17,16 @@ from parapoint.files.obj_rewriting import libraries, rewrite_obj
 from parapoint.files.point_writers import write_points
 from parapoint.files.reading import Polygons
 from parapoint.method import UnsupportedError
+from parapoint.planar.domains import FlatteningError
+from parapoint.surfaces.areas import MOST_STARVED
 from parapoint.surfaces.components import components
 from parapoint.surfaces.parameterization import Charted, Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, PointCloud
 from parapoint.textures.checkerboard import checkerboard
 from parapoint.textures.placing import BORDER, Placing
 from parapoint.textures.preview import write_preview
-from parapoint.unwrapping.domains import FlatteningError
 from parapoint.unwrapping.given import unwrapped_along
-from parapoint.unwrapping.quality import MOST_STARVED, Quality, quality
+from parapoint.unwrapping.quality import Quality, quality
 from parapoint.unwrapping.unwrap import Unwrap
 
 logger = logging.getLogger("parapoint")
@@ -86,7 +87,7 @@ def unwrap_mesh(given: Polygons, request: Request) -> dict[str, object]:
             edges = read_seams(request.seams, mesh)
             seconds = request.method.time_budget
             deadline = math.inf if seconds is None else time.monotonic() + seconds
-            made = unwrapped_along(mesh, edges, request.method.iterations, deadline)
+            made = unwrapped_along(mesh, edges, deadline)
     except (UnsupportedError, InputError) as error:
         raise InputError(f"{request.source}: {error}") from None
     except FlatteningError as error:

@@ -13,10 +13,11 @@ from scipy.spatial import cKDTree
 
 from parapoint.computed.flattening import FlatMap, flat_map
 from parapoint.computed.interpolation import Anchors, InterpolatedMap
+from parapoint.computed.parts import DISTORTIONS, Distortion
 from parapoint.computed.reconstruction import ReconstructionError
 from parapoint.estimator import Estimator
 from parapoint.fitting import Fitted, Progress, Session
-from parapoint.parameters import check_whole
+from parapoint.parameters import check_choice, check_whole
 from parapoint.surfaces.frame import Frame
 from parapoint.surfaces.sampling import FEWEST_POINTS, training_points, without_coincident
 from parapoint.surfaces.surface import FloatArray, PointCloud, Surface, vertex_normals
@@ -35,11 +36,12 @@ DESCENDING = 0.8
 
 @dataclass
 class ComputedMap(Estimator):
-    """A nearly conformal, free-boundary UV map of a bare point cloud, computed without training.
+    """A free-boundary UV map of a bare point cloud, computed without training.
 
     Ours, and not the paper's method: no network takes part. The cloud is triangulated
     (`parapoint.computed.reconstruction`), cut open along short seams and flattened one to one
-    (`parapoint.computed.flattening`, `.bijection`); the map of any other point is interpolated
+    (`parapoint.computed.flattening`), and every part keeps its area (`parapoint.computed.parts`);
+    the map of any other point is interpolated
     between those of the fitted points (`parapoint.computed.interpolation`). docs/COMPUTED.md has
     the experiments behind it.
 
@@ -53,6 +55,9 @@ class ComputedMap(Estimator):
 
     Attributes:
         points: the most points that the map is computed on.
+        distortion: "conformal" keeps angles, whatever becomes of an ear or a finger; "balanced"
+            keeps them as far as every part keeps its area, along longer seams where need be;
+            "isometric" keeps angles and areas alike.
         time_budget: seconds that a fit may take; the number of points follows the machine's speed,
             as busy as it is. None takes as long as it takes.
         components: "together", one map of the whole surface; "each", one of each component, side by
@@ -63,6 +68,7 @@ class ComputedMap(Estimator):
     packages: ClassVar[tuple[str, ...]] = ("libigl", "scipy")
 
     points: int = 20_000
+    distortion: Distortion = "balanced"
     time_budget: float | None = None
     components: str = "together"
     seed: int = 0
@@ -76,6 +82,7 @@ class ComputedMap(Estimator):
         """See `Estimator`."""
         super().check()
         check_whole("points", self.points, FEWEST_POINTS)
+        check_choice("distortion", self.distortion, DISTORTIONS)
 
     def fit_part(self, surface: Surface, share: float, session: Session) -> Fitted:
         """See `parapoint.fitting.Strategy`.
@@ -89,10 +96,10 @@ class ComputedMap(Estimator):
         budget = None if self.time_budget is None else self.time_budget * share
         deadline = math.inf if budget is None else begun + DESCENDING * budget
         if budget is None:
-            drawn = _computed(surface, count, self.seed, deadline)
+            drawn = _computed(surface, count, self, deadline)
         else:
             few = min(count, max(FEWEST_POINTS, round(TRIAL_PER_SECOND * budget)))
-            drawn = _computed_within(surface, few, count, self.seed, deadline)
+            drawn = _computed_within(surface, few, count, self, deadline)
         flat, cloud = _as_the_normals(drawn.flat, drawn, surface), drawn.cloud
         if missing := len(cloud) - len(flat.anchors):
             logger.warning(
@@ -140,15 +147,17 @@ def _as_the_normals(flat: FlatMap, drawn: _Drawn, surface: Surface) -> FlatMap:
     return flat.turned() if agreement.sum() < 0 else flat
 
 
-def _computed(surface: Surface, count: int, seed: int, deadline: float) -> _Drawn:
+def _computed(surface: Surface, count: int, of: ComputedMap, deadline: float) -> _Drawn:
     """The map of at most `count` points of a surface."""
-    points = training_points(surface, count, seed)
+    points = training_points(surface, count, of.seed)
     frame = Frame.of(points)
     cloud = without_coincident(frame.inside(points))
-    return _Drawn(points, frame, cloud, flat_map(cloud, deadline))
+    return _Drawn(points, frame, cloud, flat_map(cloud, deadline, of.distortion))
 
 
-def _computed_within(surface: Surface, few: int, most: int, seed: int, deadline: float) -> _Drawn:
+def _computed_within(
+    surface: Surface, few: int, most: int, of: ComputedMap, deadline: float
+) -> _Drawn:
     """The map of as many points, up to `most`, as the time up to `deadline` allows.
 
     A map of `few` points comes first. It tells how fast this machine is on this surface, and it
@@ -157,7 +166,7 @@ def _computed_within(surface: Surface, few: int, most: int, seed: int, deadline:
     before = time.monotonic()
     first: _Drawn | None = None
     try:
-        first = _computed(surface, few, seed, deadline)
+        first = _computed(surface, few, of, deadline)
     except ReconstructionError as error:
         fault = error
     now = time.monotonic()
@@ -166,7 +175,7 @@ def _computed_within(surface: Surface, few: int, most: int, seed: int, deadline:
     # Where the surface has no more points than the first map took, there is nothing to add.
     if count > few and (first is None or len(first.points) == few):
         try:
-            second = _computed(surface, count, seed, deadline)
+            second = _computed(surface, count, of, deadline)
         except ReconstructionError as error:
             logger.warning("no map of %d points could be computed: %s", count, error)
             fault = error

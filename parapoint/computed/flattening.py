@@ -1,10 +1,11 @@
-"""A nearly conformal map of a bare cloud with short seams, computed without training.
+"""A map of a bare cloud with short seams, computed without training.
 
 The cloud is triangulated, cut, and flattened by a bijective map. The cuts lead to where the scale
 of a conformal map, found by a linear solve, is most extreme (as in Sawhney and Crane 2017,
 "Boundary first flattening", section 6), and are as long as an even scale needs, and to what would
 be too small for numbers without. The map is laid out by that scale (`parapoint.computed.layout`),
-then made bijective (`parapoint.computed.bijection`).
+then made bijective (`parapoint.planar.bijection`) and, unless it is to be conformal at any cost,
+such that every part keeps its area (`parapoint.computed.parts`).
 """
 
 from __future__ import annotations
@@ -13,21 +14,20 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import sparse
 from scipy.sparse import csgraph
 
-from parapoint.computed.bijection import FLATTEST, bijective_map, signed_areas, tutte
 from parapoint.computed.denoising import denoised
 from parapoint.computed.layout import scaled_layout
+from parapoint.computed.parts import Distortion, parts_kept
 from parapoint.computed.reconstruction import ReconstructionError, defects, triangulation
 from parapoint.computed.scale import area_discrepancy, even_scale, log_scale, mapped_areas, turning
+from parapoint.planar.bijection import bijective_map
+from parapoint.planar.embedding import embeddable, few_edges_graph, path_edges
+from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.cutting import (
     cut_along,
     cut_to_disk,
-    edge_graph,
-    edge_lengths,
     origin,
-    path_to,
 )
 from parapoint.surfaces.parameterization import Charted, Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
@@ -42,8 +42,6 @@ with noise of 0.5 and 1 % of the diagonal, 0.6 to 3 on models with details as fi
 spacing."""
 TIPS = 3
 """Extremal points that are tried as the tip of each cut."""
-MOST_OPENINGS = 50
-"""Cuts at most to what Tutte's embedding flattens; one to three were needed where any was."""
 LONELY = 6.0
 """Cost of a vertex most of whose edges cross the seam, in such edges' share."""
 SWEEPS = 10
@@ -111,7 +109,9 @@ class Flattened(NamedTuple):
         return _chosen_copies(self.disk, self.origin)
 
 
-def flattened(points: FloatArray, deadline: float = math.inf) -> Flattened:
+def flattened(
+    points: FloatArray, deadline: float = math.inf, distortion: Distortion = "conformal"
+) -> Flattened:
     """Distinct points (N, 3) triangulated, cut and flattened; see `flat_map`.
 
     Raises:
@@ -129,6 +129,7 @@ def flattened(points: FloatArray, deadline: float = math.inf) -> Flattened:
     try:
         disk = _seamed(mesh)
         uv = bijective_map(disk, _layout(disk), deadline)
+        disk, uv = parts_kept(disk, uv, distortion, deadline)
     except (RuntimeError, np.linalg.LinAlgError) as error:  # a singular factor, no bijection
         raise ReconstructionError(f"the triangulation has no flat map ({error})") from None
     uv -= (uv.max(axis=0) + uv.min(axis=0)) / 2
@@ -136,13 +137,20 @@ def flattened(points: FloatArray, deadline: float = math.inf) -> Flattened:
     return Flattened(reached, mesh, disk, origin(mesh, disk), uv, is_denoised)
 
 
-def flat_map(points: FloatArray, deadline: float = math.inf) -> FlatMap:
-    """A nearly conformal map of distinct points (N, 3), less so where `deadline` ends the descents.
+def flat_map(
+    points: FloatArray, deadline: float = math.inf, distortion: Distortion = "conformal"
+) -> FlatMap:
+    """A map of distinct points (N, 3), worse where `deadline` ends the descents.
+
+    Args:
+        points: the cloud.
+        deadline: no descent takes a step after this time of `time.monotonic`.
+        distortion: what the map keeps, see `parapoint.computed.parts`.
 
     Raises:
         ReconstructionError: the points show no surface that can be followed and flattened.
     """
-    flat = flattened(points, deadline)
+    flat = flattened(points, deadline, distortion)
     chosen = flat.chosen()
     jacobians = flat.jacobians()[chosen]
     boundary = [int((of.edge_face_count == 1).sum()) for of in (flat.mesh, flat.disk)]
@@ -152,6 +160,7 @@ def flat_map(points: FloatArray, deadline: float = math.inf) -> FlatMap:
         "faces": len(flat.mesh.faces),
         "seam_edges": (boundary[1] - boundary[0]) // 2,
         "denoised": flat.is_denoised,
+        "distortion": distortion,
     }
     inverse: FloatArray = np.asarray(np.linalg.pinv(jacobians, rcond=0.1), dtype=np.float64)
     charted = Charted(flat.mesh, Parameterization(flat.uv, flat.disk.faces))
@@ -182,7 +191,7 @@ def _seamed(mesh: Mesh) -> Mesh:
         opened = cut_to_disk(mesh)
     opened = _joined_loops(opened)
     opened = _scale_cuts(opened, budget - (len(opened.vertices) - len(mesh.vertices)))
-    return _embeddable(opened)
+    return embeddable(opened)
 
 
 def _layout(disk: Mesh) -> FloatArray | None:
@@ -193,18 +202,6 @@ def _layout(disk: Mesh) -> FloatArray | None:
     if len(disk.boundary_loops) > 1:
         return None
     return scaled_layout(disk, even_scale(disk))
-
-
-def _graph(mesh: Mesh) -> sparse.csr_matrix:
-    """The symmetric (V, V) graph of the edges; their lengths plus the mean, so few are best."""
-    lengths = edge_lengths(mesh)
-    return edge_graph(mesh, lengths + lengths.mean())
-
-
-def _path(previous: IntArray, vertex: int) -> IntArray:
-    """(n, 2) edges from `vertex` back to the root of its tree in `previous`."""
-    path = path_to(previous, vertex)
-    return np.stack([path[:-1], path[1:]], axis=1).astype(np.int64)
 
 
 def _joined_loops(mesh: Mesh) -> Mesh:
@@ -221,10 +218,10 @@ def _joined_loops(mesh: Mesh) -> Mesh:
         if wrong[worst] < np.pi:
             break
         distance, previous, _ = csgraph.dijkstra(
-            _graph(mesh), indices=loops[worst], return_predecessors=True, min_only=True
+            few_edges_graph(mesh), indices=loops[worst], return_predecessors=True, min_only=True
         )
         others = np.concatenate([loop for i, loop in enumerate(loops) if i != worst])
-        mesh = cut_along(mesh, _path(previous, int(others[distance[others].argmin()])))
+        mesh = cut_along(mesh, path_edges(previous, int(others[distance[others].argmin()])))
     return mesh
 
 
@@ -238,7 +235,7 @@ def _scale_cuts(mesh: Mesh, budget: int) -> Mesh:
     scale, area = log_scale(mesh), mesh.face_areas.sum()
     discrepancy = area_discrepancy(mesh, scale)
     while discrepancy > AREA_DISCREPANCY:
-        graph = _graph(mesh)
+        graph = few_edges_graph(mesh)
         distance, previous, _ = csgraph.dijkstra(
             graph,
             indices=np.concatenate(mesh.boundary_loops),
@@ -251,7 +248,7 @@ def _scale_cuts(mesh: Mesh, budget: int) -> Mesh:
         for _ in range(TIPS):
             tip = int(np.where(blocked, -1.0, extreme).argmax())
             blocked |= np.isfinite(csgraph.dijkstra(graph, indices=tip, limit=distance[tip] / 2))
-            path = _path(previous, tip)
+            path = path_edges(previous, tip)
             if not 0 < len(path) <= budget:
                 continue
             cut = cut_along(mesh, path)
@@ -265,31 +262,6 @@ def _scale_cuts(mesh: Mesh, budget: int) -> Mesh:
         if gain <= 0:
             break
         mesh, scale, discrepancy, budget = cut, new_scale, new_discrepancy, budget - length
-    return mesh
-
-
-def _embeddable(mesh: Mesh) -> Mesh:
-    """The planar domain cut until Tutte's embedding has room for all of its faces.
-
-    It shrinks a horn or a tail exponentially from its foot to its tip, and so it does a strip of
-    triangles that hangs into a hole. A cut from the outer loop to the far end of what is too flat
-    for numbers, or to the hole, brings this to the rim of the disk.
-    """
-    for _ in range(MOST_OPENINGS):
-        flat = ~(signed_areas(tutte(mesh), mesh.faces) > FLATTEST)
-        if not flat.any():
-            break
-        loops = mesh.boundary_loops
-        distance, previous, _ = csgraph.dijkstra(
-            _graph(mesh), indices=loops[0], return_predecessors=True, min_only=True
-        )
-        squeezed = np.unique(mesh.faces[flat])
-        path = _path(previous, int(squeezed[distance[squeezed].argmax()]))
-        at_hole = np.flatnonzero(np.isin(path[:, 0], np.concatenate(loops)))
-        path = path[at_hole[-1] :] if len(at_hole) else path
-        if not len(path):
-            break
-        mesh = cut_along(mesh, path)
     return mesh
 
 

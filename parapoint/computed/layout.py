@@ -1,6 +1,6 @@
 """A planar map of a given scale: the triangles turned by parallel transport, then fitted together.
 
-The map may cover itself; `parapoint.computed.bijection` makes a bijective one of it.
+The map may cover itself; `parapoint.planar.bijection` makes a bijective one of it.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from parapoint.computed.bijection import factored
 from parapoint.computed.scale import laplacian
+from parapoint.planar.embedding import factored
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, twin_halfedges
 
 LARGEST_SCALE = 8.0

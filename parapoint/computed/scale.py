@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse
 from scipy.optimize import minimize
 
-from parapoint.computed.bijection import factored
+from parapoint.planar.embedding import factored
 from parapoint.surfaces.surface import FloatArray, Mesh
 
 COTANGENTS = (0.02, 20.0)

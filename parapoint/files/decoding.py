@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from contextvars import ContextVar
+
 from parapoint.errors import InputError
 
 PACKED = {
@@ -25,6 +28,8 @@ DECODED_LEAST = 64 * 2**20
 DECODED_TIMES = 32
 """A larger file may decode to so many times its own size."""
 
+_allowed: ContextVar[float] = ContextVar("_allowed", default=DECODED_LEAST)
+
 
 def plain(data: bytes) -> bytes:
     """The data without a byte order mark, and as UTF-8 where they were UTF-16 or UTF-32.
@@ -47,6 +52,11 @@ def plain(data: bytes) -> bytes:
     return data
 
 
+def allow(size: float) -> None:
+    """Let every file decode to so many bytes, from here on, in place of DECODED_LEAST."""
+    _allowed.set(max(size, DECODED_LEAST))
+
+
 def check_decoded(size: int, file_size: int) -> None:
     """Check, before any memory is taken, that a file decodes to no more than it may.
 
@@ -55,10 +65,11 @@ def check_decoded(size: int, file_size: int) -> None:
         file_size: bytes of the file.
 
     Raises:
-        InputError: that is more than DECODED_LEAST and DECODED_TIMES the file's own size.
+        InputError: that is more than is allowed, and than DECODED_TIMES the file's own size.
     """
-    if size > max(DECODED_LEAST, DECODED_TIMES * file_size):
+    if size > max(_allowed.get(), DECODED_TIMES * file_size):
+        gigabytes = math.ceil(size / 1e9)
         raise InputError(
             f"has {file_size:,} bytes that decode to {size:,}, more than {DECODED_TIMES} times as "
-            "much; unpack it by the tool that wrote it"
+            f"much; unpack it by the tool that wrote it, or allow --memory {gigabytes} GB"
         )

@@ -14,6 +14,9 @@ def stl(data: bytes) -> Content:
     """STL, text or binary: a soup of triangles, whose corners are welded where they are equal."""
     from trimesh.exchange.stl import load_stl
 
+    size = 84 + 50 * int.from_bytes(data[80:84], "little")
+    if 84 < size < len(data) and b"facet" not in data[:size].lower():
+        data = data[:size]  # some tools append what they know of the part
     parts = load_stl(io.BytesIO(data))
     solids = list(parts["geometry"].values()) if "geometry" in parts else [parts]
     soup = [np.asarray(solid["vertices"])[solid["faces"]].reshape(-1, 3) for solid in solids]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 from typing import Any
 
@@ -13,12 +14,16 @@ from parapoint.files.attributes import colours_of
 from parapoint.files.content import Content, points_content
 from parapoint.surfaces.surface import FloatArray
 
+logger = logging.getLogger("parapoint")
+
 LOOKED_AT = 20_000
 """Lines, spread over the file, by which the meaning of its commas is told."""
 DECIMAL_COMMA = re.compile(rb"[+-]?\d*,\d+(?:[eE][+-]?\d+)?$|[+-]?\d+$")
 """A word with one comma at most, as it is written where the comma marks decimals."""
 GROUPED = re.compile(rb"[+-]?\d{1,3}(?:,\d{3})+\.\d*$")
 """A number whose thousands are parted by commas; 1,234.5."""
+GROUPED_WHOLE = re.compile(rb"[+-]?\d{1,3}(?:,\d{3})+$")
+"""The same without a fraction; beside others that have one."""
 GROUPED_BY_POINTS = re.compile(rb"[+-]?\d{1,3}(?:\.\d{3})+,\d*$")
 """The same as it is written where the comma marks decimals; 1.234,5."""
 
@@ -39,7 +44,7 @@ def text_lines(data: bytes) -> list[bytes]:
     """
     lines = [
         line
-        for line in data.replace(b";", b" ").splitlines()
+        for line in data.translate(None, b'"').replace(b";", b" ").splitlines()
         if line.strip() and not line.lstrip().startswith((b"#", b"//"))
     ]
     if b"," not in data:
@@ -54,7 +59,9 @@ def text_lines(data: bytes) -> list[bytes]:
         if points:
             spaced = (line.replace(b".", b"") for line in spaced)
         return [line.replace(b",", b".") for line in spaced]
-    grouped = with_comma and all(GROUPED.match(word) for word in with_comma)
+    grouped = any(GROUPED.match(word) for word in with_comma) and all(
+        GROUPED.match(word) or GROUPED_WHOLE.match(word) for word in with_comma
+    )
     if grouped and min(map(len, words)) >= 3:
         return [re.sub(rb",(?=\d)", b"", line).replace(b",", b" ") for line in lines]
     return [line.replace(b",", b" ") for line in lines]
@@ -112,7 +119,28 @@ def xyz(data: bytes) -> Content:
         values = table(lines, (0, 1, 2))
     if values.shape[1] < 3:
         raise InputError("has fewer than three numbers in a line")
+    values = values[:, _coordinates_first(data, values)]
     return points_content(values[:, :3], *_further_columns(values))
+
+
+def _coordinates_first(data: bytes, values: FloatArray) -> list[int]:
+    """The columns in the order x, y, z and others, by the heading if it names them.
+
+    Without such a heading a first column that numbers the rows is left out, and a warning says so.
+    """
+    columns = list(range(values.shape[1]))
+    heading = data.lstrip(b"#/ \t").split(b"\n", 1)[0].decode("latin-1").lower()
+    names = re.findall(r"[^\s,;\"]+", heading)
+    if len(names) == len(columns) and {"x", "y", "z"} <= set(names):
+        at = [names.index(name) for name in "xyz"]
+        return at + [column for column in columns if column not in at]
+    number = values[:, 0]
+    if len(columns) > 3 and len(number) > 2 and number[0] in {0, 1}:
+        others_are_whole = (values[:, 1:4] == np.floor(values[:, 1:4])).all()
+        if (np.diff(number) == 1).all() and not others_are_whole:
+            logger.warning("the first column numbers the rows: the coordinates are behind it")
+            return columns[1:]
+    return columns
 
 
 def _further_columns(

@@ -5,18 +5,16 @@ from __future__ import annotations
 import math
 
 from parapoint.errors import InputError
+from parapoint.planar.descent import Run
+from parapoint.planar.domains import check_triangles
 from parapoint.surfaces.cutting import cut_along, cut_to_disk
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import IntArray, Mesh
-from parapoint.unwrapping.descent import Run
-from parapoint.unwrapping.domains import check_triangles
 from parapoint.unwrapping.packing import by_component
 
 
-def unwrapped_along(
-    mesh: Mesh, seams: IntArray, iterations: int, deadline: float = math.inf
-) -> Parameterization:
-    """SLIM over each chart that a mesh falls into along its seams, one to one.
+def unwrapped_along(mesh: Mesh, seams: IntArray, deadline: float = math.inf) -> Parameterization:
+    """An isometric map of each chart that a mesh falls into along its seams, one to one.
 
     Charts that are no disks, with or without holes, are cut to disks automatically (the report
     counts them); all are packed without a change of scale.
@@ -24,7 +22,6 @@ def unwrapped_along(
     Args:
         mesh: manifold and consistently oriented.
         seams: (S, 2) edges along which the mesh is cut.
-        iterations: steps of SLIM.
         deadline: `time.monotonic()` after which no step begins.
 
     Raises:
@@ -43,7 +40,7 @@ def unwrapped_along(
             chart, completed = cut_to_disk(chart), completed + 1
         run = Run(chart, deadline)
         run.begin(None)
-        run.improve(iterations)
+        run.improve()
         parts.append(run.report())
         return Parameterization(run.uv, chart.faces)
 

@@ -8,15 +8,12 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
+from parapoint.surfaces.areas import STARVED
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.surface import BoolArray, FloatArray, flat_faces, twin_halfedges
 
-STARVED = 0.25
-"""A face is starved where its share of the UV area is below this part of its share in space."""
 LEAST_PART = 0.01
 """Share of the surface that a starved part must hold to be looked at by itself."""
-MOST_STARVED = 0.02
-"""Share of the surface that may be starved before a warning is due."""
 
 
 @dataclass(frozen=True)

@@ -14,16 +14,17 @@ from parapoint.computed.computed_map import ComputedMap
 from parapoint.computed.reconstruction import ReconstructionError
 from parapoint.method import UnsupportedError
 from parapoint.parameters import check_number
+from parapoint.planar.descent import LEAST_ENERGY, Run, sound
+from parapoint.planar.domains import FlatteningError
+from parapoint.planar.embedding import embeddable
+from parapoint.planar.growth import grown
+from parapoint.surfaces.areas import MOST_STARVED, starved_share
 from parapoint.surfaces.cutting import cut_along, disk_cut, edge_lengths
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.preparation import prepared
 from parapoint.surfaces.sampling import FEWEST_VERTICES
 from parapoint.surfaces.spanning import learned_seam, unfolded
 from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, Surface
-from parapoint.unwrapping.descent import LEAST_ENERGY, Run, sound
-from parapoint.unwrapping.domains import FlatteningError, check_iterations
-from parapoint.unwrapping.growth import grow, grow_to, grow_to_feed, starved
-from parapoint.unwrapping.quality import MOST_STARVED
 
 POINTS_OF_A_FACE = 100
 """Of a mesh with few faces so many points are sampled on each. Along the seams of a fish of 220
@@ -34,16 +35,14 @@ SHARE_OF_SEAM = 0.5
 
 @dataclass(frozen=True)
 class Unwrap:
-    """SLIM on the mesh cut along the seams of the computed map; no flips, one to one.
+    """An isometric map of the mesh, cut along the seams of the computed map; no flips, one to one.
 
     `ComputedMap` maps the vertices; along its seam, made a clean path of edges
-    (`parapoint.surfaces.spanning`), the mesh is cut. SLIM (M. Rabinovich et al. 2017) starts from a
-    bijective map of small energy (`parapoint.computed.bijection`), or from the computed map where
-    that has less and is one to one on the cut mesh. A step after which the boundary would cross
-    itself is taken anew with the vertices that cross held where they are, so the map stays one to
-    one. Then the seam grows to where the map is most distorted (X. Gu et al. 2002, "Geometry
-    images"), as long as that pays, and on until
-    hardly a place is starved of area and a bound on the energy is met.
+    (`parapoint.surfaces.spanning`), the mesh is cut. The symmetric Dirichlet energy is brought down
+    from Tutte's embedding, or from the computed map where that has less and is one to one on the
+    cut mesh; the boundary never crosses itself (`parapoint.planar.scaffold`). Then the seam grows
+    to where the map is most distorted (`parapoint.planar.growth`), as long as that pays, and on
+    until hardly a place is starved of area and a bound on the energy is met.
 
     Where no map can be computed, the automatic cut (`parapoint.surfaces.cutting`) stands for it.
 
@@ -54,7 +53,6 @@ class Unwrap:
         points: of the computed map; None for its own number, or fewer for a mesh of few faces.
         time_budget: seconds for each component, or None for no bound. No step begins after that;
             the map is then as good as it has become.
-        iterations: steps of SLIM, at least 1; the longer seam takes more.
         price: what the symmetric Dirichlet energy (4 at least) must fall by for each sqrt(area) of
             seam; None for the learned seam, no shorter and no longer.
         max_distortion: symmetric Dirichlet energy, above 4, down to which the seam grows at
@@ -63,15 +61,13 @@ class Unwrap:
 
     points: int | None = None
     time_budget: float | None = None
-    iterations: int = 20
-    price: float | None = 0.1
+    price: float | None = 1.0
     max_distortion: float | None = None
 
     requires: ClassVar[frozenset[str]] = frozenset({"faces", "manifold", "oriented", "connected"})
     packages: ClassVar[tuple[str, ...]] = ("libigl", "shapely")
 
     def __post_init__(self) -> None:
-        check_iterations(self.iterations)
         if self.price is not None:
             check_number("price", self.price)
         if self.time_budget is not None:
@@ -134,7 +130,9 @@ class Unwrap:
         start: FloatArray | None = None
         computed: dict[str, object]
         try:
-            learned = ComputedMap(points, time_budget=budget).parameterize(mesh, seed=seed)
+            learned = ComputedMap(points, distortion="conformal", time_budget=budget).parameterize(
+                mesh, seed=seed
+            )
         except ReconstructionError as error:
             computed = {"failed": str(error)}
             seam = np.zeros(len(mesh.edges), dtype=bool)
@@ -146,16 +144,15 @@ class Unwrap:
             seam = learned_seam(mesh, learned.uv)
             disk = cut_along(mesh, mesh.edges[seam])
             start = unfolded(mesh, learned.uv, disk)
-        run = Run(disk, deadline)
-        run.begin(start)
-        run.improve(self.iterations)
+        opened = embeddable(disk)
+        run = Run(opened, deadline)
+        run.begin(start if len(opened.vertices) == len(disk.vertices) else None)
+        run.improve()
         if self.price is not None:
             if whole is not None and whole.energy <= run.energy + self.price * _length(mesh, seam):
                 run, seam = whole, np.zeros_like(seam)
-            grow(run, self.price)
-            grow_to_feed(run)
-        if self.max_distortion is not None:
-            grow_to(run, self.max_distortion)
+            run = grown(run, self.price, most_energy=self.max_distortion or np.inf)
+            run.improve()
         report = {
             **run.report(),
             "learned_seam_edges": int(seam.sum()),
@@ -164,7 +161,7 @@ class Unwrap:
         return Parameterization(run.uv, run.mesh.faces, report=report)
 
     def _uncut(self, mesh: Mesh, deadline: float) -> Run | None:
-        """SLIM without a cut, where the mesh has such a map and the price may be too high."""
+        """The map without a cut, where the mesh has one and the price may be too high."""
         if self.price is None or not mesh.is_planar_domain:
             return None
         run = Run(mesh, deadline)
@@ -172,7 +169,7 @@ class Unwrap:
             run.begin(None)
         except FlatteningError:
             return None
-        run.improve(self.iterations)
+        run.improve()
         return run
 
     def _needs_no_cut(self, whole: Run, mesh: Mesh) -> bool:
@@ -180,7 +177,7 @@ class Unwrap:
         assert self.price is not None
         least = self.price * float(edge_lengths(mesh).min() / np.sqrt(mesh.face_areas.sum()))
         is_bounded = self.max_distortion is None or whole.energy <= self.max_distortion
-        is_fed = starved(whole) <= MOST_STARVED
+        is_fed = starved_share(whole.mesh, whole.uv) <= MOST_STARVED
         return whole.energy - LEAST_ENERGY <= least and is_bounded and is_fed
 
 

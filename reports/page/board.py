@@ -15,7 +15,7 @@ from reports.contents import (
     number,
 )
 from reports.means import STATISTICS, common_cases, common_values, own_values, statistic
-from reports.ranking import TIMES, Mark, marks, may_rank, means_may_rank
+from reports.ranking import TIMES, Mark, flagged, marks, may_rank, means_may_rank
 from reports.tables.leaderboard import SHOWN, definition, page_of
 from reports.tables.table import Column, metric_column
 
@@ -136,6 +136,10 @@ def _maps(contents: Contents, case: str, names: Sequence[str]) -> list[dict[str,
             for label, record in zip(contents.methods, records, strict=True)
         ]
         columns.append(_marked(column, [number(record, metric) for record in records], fit))
+    for column, entries in zip(map(metric_column, names), columns, strict=True):
+        for at, (record, (text, value, mark)) in enumerate(zip(records, entries, strict=True)):
+            if record is not None and value is not None:
+                entries[at] = (flagged(text, record["grade"], angles=column.angles), value, mark)
     return [
         record
         and {

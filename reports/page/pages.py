@@ -13,6 +13,7 @@ from markupsafe import Markup
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
 
+from benchmarks.metrics.grades import BOUNDS
 from benchmarks.rendering.maps import ANGLE_SCALE, AREA_SCALE
 from reports.contents import Label
 from reports.page import board, viewer
@@ -36,7 +37,7 @@ SCALES = {
 }
 """Title, colours and range, and the ends in words, of each distortion in the viewer."""
 
-ASSETS = ("style.css", "page.js", "viewer.js")
+ASSETS = ("style.css", "page.js", "unpack.js", "shaders.js", "viewer.js")
 """What all pages share."""
 
 
@@ -103,6 +104,7 @@ def model_page(section: Section, case: str) -> str:
         .render(
             section=section,
             case=case,
+            bounds=BOUNDS,
             about=section.about(case),
             pages=pages,
             before=pages[at - 1][1] if at else "",

@@ -67,7 +67,7 @@ class Example:
         name: of the method.
         pictures: addresses: one view, or two where some faces are flipped.
         said: grade and share of flipped faces; of a cell without a map, how it ended.
-        mark: "bad" for what is no map, broken or collapsed; else "".
+        mark: "bad" where there is no map, or a broken or collapsed one; else "".
     """
 
     name: str
@@ -84,6 +84,7 @@ class Card:
         label: the method.
         row: its cell.
         detail: its parameters that are told.
+        grade: of its map; "" where there is none, or it is not known.
         map: address of what the viewer reads, from the page; "" where there is none.
         pictures: addresses by what they show; of a mesh two, which the viewer takes the place of.
         numbers: the metrics of SHOWN.
@@ -93,6 +94,7 @@ class Card:
     label: Label
     row: ResultRow
     detail: str
+    grade: str
     map: str
     pictures: Mapping[str, str]
     numbers: Sequence[Number]
@@ -106,7 +108,7 @@ class Section:
     Attributes:
         report: the folder of the report.
         contents: its cells.
-        tables: the one to read first first.
+        tables: in the order in which to read them.
         figures: those that were drawn.
         faults: what could not be drawn, and why.
     """
@@ -144,7 +146,7 @@ class Section:
 
     @property
     def unfinished(self) -> list[ResultRow]:
-        """The cells that did not end well."""
+        """The cells without a map."""
         return [row for row in self.contents.rows if row.status != "ok"]
 
     @property
@@ -261,6 +263,7 @@ class Section:
                     label,
                     row,
                     ", ".join(part for part in (label.detail, seed) if part),
+                    str(self._values[row.id]["grade"] or ""),
                     f"../../{viewed}" if viewed else "",
                     self._pictures(row),
                     self._numbers(case, label, row),
@@ -312,7 +315,7 @@ class Section:
                     vertices, faces = len(surface.vertices), len(surface.faces)
                     return f"{vertices:,} vertices, {faces:,} faces; {surface.topology}."
                 return f"A cloud of {len(surface.points):,} points."
-        return "The model is not at hand."
+        return "The model could not be had."
 
     @property
     def command(self) -> str:

@@ -120,7 +120,7 @@ def paged(
 
 
 def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
-    """All figures of a suite, the ones to look at first first."""
+    """All figures of a suite, in the order in which to look at them."""
     checker = (
         "The checkerboard's fields have the same size in UV for all methods, whose UV area is "
         "scaled to that of the surface. Green: seams, and faces that span a learned seam; orange: "

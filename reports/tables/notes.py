@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from reports.contents import Contents
+from reports.ranking import COLLAPSED_FLAG
 
 
 def environment_note(contents: Contents) -> str:
@@ -53,7 +54,7 @@ def grade_notes(contents: Contents) -> list[str]:
     notes = []
     for grade, meaning in (
         ("broken", "broken, so not ranked"),
-        ("collapsed", "collapsed (a part of the surface is shrunk to nothing), ranked by angles"),
+        ("collapsed", f"collapsed, so ranked by angles alone ({COLLAPSED_FLAG})"),
     ):
         found = [
             f"{label} on {case}"
@@ -86,7 +87,7 @@ def method_notes(contents: Contents) -> list[str]:
 
 
 def failure_notes(contents: Contents) -> list[str]:
-    """One line a way in which cells did not end well."""
+    """A line for each way in which cells gave no map."""
     reasons: dict[tuple[str, str, str], list[str]] = {}
     for row in contents.rows:
         if row.status != "ok":

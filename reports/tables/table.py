@@ -21,7 +21,7 @@ from reports.contents import (
     SPANNING,
 )
 from reports.numbers import printed
-from reports.ranking import TIMES, Mark, is_of_angles, marks, may_rank, tolerance
+from reports.ranking import TIMES, Mark, flagged, is_of_angles, marks, may_rank, tolerance
 
 Value = float | str | None
 
@@ -156,21 +156,29 @@ class Table:
                 found[r][c] = mark
         return tuple(
             tuple(
-                Cell(texts[r][c], found[r][c], row.get(column.key))
+                Cell(_flagged(texts[r][c], row, column), found[r][c], row.get(column.key))
                 for c, column in enumerate(columns[r])
             )
             for r, row in enumerate(block)
         )
 
 
-def _rankable(row: Mapping[str, Value], column: Column) -> float | None:
-    """The value of a row that takes part in the ranking; None where it has none, or may not.
+def _grade(row: Mapping[str, Value], column: Column) -> str | None:
+    """The grade of the map of a value: under "grade", or column by column under "grade KEY"."""
+    found = row.get(f"grade {column.key}", row.get("grade"))
+    return found if isinstance(found, str) else None
 
-    The grade of the map stands under "grade", or column by column under "grade KEY".
-    """
-    value, grade = row.get(column.key), row.get(f"grade {column.key}", row.get("grade"))
-    fit = may_rank(grade if isinstance(grade, str) else None, angles=column.angles)
+
+def _rankable(row: Mapping[str, Value], column: Column) -> float | None:
+    """The value of a row that takes part in the ranking; None where it has none, or may not."""
+    value, fit = row.get(column.key), may_rank(_grade(row, column), angles=column.angles)
     return float(value) if fit and column.better and isinstance(value, int | float) else None
+
+
+def _flagged(text: str, row: Mapping[str, Value], column: Column) -> str:
+    """The text of a value, flagged where its map is collapsed and ranked nevertheless."""
+    known = isinstance(row.get(column.key), int | float)
+    return flagged(text, _grade(row, column), angles=column.angles) if known else text
 
 
 def grouped(columns: Sequence[Column]) -> list[tuple[str, int]]:

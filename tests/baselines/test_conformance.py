@@ -19,7 +19,7 @@ COPY = (  # an external program: every vertex to its x and y
 )
 ARGUMENTS = {
     "computed": {"points": 150},
-    "unwrap": {"points": 120, "iterations": 2},
+    "unwrap": {"points": 120},
     "meshed": {"reconstruction": "ball_pivoting"},  # the faster one
     "external": {"command": COPY},
     "fam": {"points": 120, "subset": 100, "iterations": 2},

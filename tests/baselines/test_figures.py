@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from baselines import registry
+from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.preparation import prepared
-from parapoint.unwrapping.domains import signed_areas
 
 
 def model(name):

@@ -7,11 +7,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from baselines import registry
 from baselines.meshed import carried
 from parapoint.method import UnsupportedError
+from parapoint.planar.domains import FlatteningError
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.preparation import prepared
 from parapoint.surfaces.surface import Mesh, PointCloud
 from parapoint.testing import irregular_disk
-from parapoint.unwrapping.domains import FlatteningError
 from parapoint.unwrapping.packing import by_component
 
 

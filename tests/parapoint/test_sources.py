@@ -63,7 +63,7 @@ DEPENDENCIES = {
     "parapoint/files/pcd.py": "parapoint.files.reading",
     "parapoint/learned/losses.py": "parapoint.learned.parapoint",
     "parapoint/computed/scale.py": "parapoint.unwrapping.unwrap",
-    "parapoint/unwrapping/tutte.py": "baselines.disks.slim",
+    "parapoint/planar/tutte.py": "baselines.disks.slim",
     "benchmarks/rendering/scene.py": "reports.pictures.drawing",
 }
 """Files, and a module that depends on each."""

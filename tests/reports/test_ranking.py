@@ -136,3 +136,22 @@ def test_in_a_row_of_methods_each_cell_has_its_own_grade():
     )
     made = Table("t", "T", "", columns, ((row,),), across=True)
     assert [cell.mark for cell in made.cells[0][0]] == ["", "second", "best", ""]
+
+
+def test_a_collapsed_map_is_flagged_where_it_is_ranked_and_nowhere_else():
+    rows = (
+        {"name": "shrunk", "angle": 0.02, "area": 0.1, "grade": "collapsed"},
+        {"name": "folded", "angle": 0.01, "area": 0.1, "grade": "broken"},
+        {"name": "none", "angle": None, "area": None, "grade": "collapsed"},
+    )
+    columns = (
+        Column("name", "Name", text=True),
+        Column("angle", "angle", better="lower", angles=True, digits=2),
+        Column("area", "area", better="lower", digits=1),
+    )
+    made = Table("t", "T", "", columns, (rows,))
+    assert [[cell.text for cell in row[1:]] for row in made.cells[0]] == [
+        ["0.02 †", "0.1"],
+        ["0.01", "0.1"],
+        ["–", "–"],
+    ]

@@ -9,9 +9,7 @@ from baselines.disks.slim import DENSITIES, SLIM, map_energy
 from baselines.disks.tutte import Tutte, tutte
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
-from parapoint.surfaces.surface import Mesh, PointCloud
-from parapoint.testing import irregular_disk, sample_surfaces, sphere
-from parapoint.unwrapping.domains import (
+from parapoint.planar.domains import (
     Domain,
     FlatteningError,
     domain,
@@ -20,6 +18,8 @@ from parapoint.unwrapping.domains import (
     signed_areas,
     singular_values,
 )
+from parapoint.surfaces.surface import Mesh, PointCloud
+from parapoint.testing import irregular_disk, sample_surfaces, sphere
 
 DISK_METHODS = [
     "tutte",

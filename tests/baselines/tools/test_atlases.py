@@ -14,11 +14,12 @@ from baselines.tools.optional import Missing, optional
 from parapoint.errors import InputError
 from parapoint.files.mesh_writers import write_textured
 from parapoint.method import MissingError
+from parapoint.planar.domains import FlatteningError
+from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.surface import Mesh
 from parapoint.testing import irregular_disk, sphere
 from parapoint.textures.checkerboard import checkerboard
-from parapoint.unwrapping.domains import FlatteningError, signed_areas
 
 
 def mapped(spec, mesh):

@@ -13,10 +13,10 @@ from baselines import registry
 from baselines.tools import blender
 from parapoint.errors import InputError
 from parapoint.method import MissingError, UnsupportedError
+from parapoint.planar.domains import FlatteningError
 from parapoint.surfaces.frame import in_unit
 from parapoint.surfaces.surface import Mesh
 from parapoint.testing import irregular_disk, sphere
-from parapoint.unwrapping.domains import FlatteningError
 
 DISK_METHODS = ("blender_angle_based", "blender_conformal", "blender_minimum_stretch")
 METHODS = (*DISK_METHODS, "blender_smart_project")

@@ -5,11 +5,11 @@ import pytest
 
 from baselines import registry
 from parapoint.method import MissingError
+from parapoint.planar.domains import FlatteningError
 from parapoint.surfaces.frame import UNIT, in_unit
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh
 from parapoint.testing import sphere
-from parapoint.unwrapping.domains import FlatteningError
 
 SIMILARITIES = [(5e5, 1.0), (6e6, 1.0), (0.0, 1e-6), (0.0, 1e6), (-7e5, 1e-3)]
 """Shifts, in sizes of the surface, and scales."""

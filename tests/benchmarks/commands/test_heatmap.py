@@ -14,6 +14,7 @@ from parapoint.surfaces.surface import Mesh
         ([1.0] * 20, 1.05),
         ([1.0] * 20 + [50.0], 1.05),  # one face of twenty-one may lie beyond the scale
         ([1.0] * 10 + [1.9] * 10, 2.0),
+        ([1.0] * 18 + [3.0] * 3, 4.0),  # three of twenty-one are more than a twentieth
         ([1e6] * 20, 100.0),
         ([np.nan] * 3, 1.05),
         ([1.2, np.nan], 1.2),

@@ -7,7 +7,12 @@ from scipy.spatial import cKDTree, distance
 
 from benchmarks.cases import builtin
 from benchmarks.metrics.evaluation import evaluate_points
-from benchmarks.metrics.pointwise import nearest_others, point_map
+from benchmarks.metrics.pointwise import (
+    nearest_others,
+    point_map,
+    point_part_area_ratio_min,
+    starved_point_fraction,
+)
 from benchmarks.metrics.table import METRICS
 from parapoint import InputError, PointCloud, PointParameterization
 
@@ -174,3 +179,13 @@ def test_few_points_and_other_lengths_are_refused():
     with pytest.raises(InputError, match="5 uv rows for a cloud of 6 points"):
         point_map(PointCloud(np.zeros((6, 3))), PointParameterization(np.zeros((5, 2))))
     assert len(scores(plane(4), plane(4))) == 13
+
+
+def test_a_seam_starves_no_point():
+    # A flat grid whose right half lies far away in UV: its area is right everywhere.
+    x, y = (of.reshape(-1) for of in np.meshgrid(np.arange(20.0), np.arange(20.0)))
+    uv = np.stack([x + 500 * (x > 9), y], axis=1)
+    torn = point_map(PointCloud(np.column_stack([x, y, 0 * x])), PointParameterization(uv))
+    assert torn.spanning.sum() == 44  # two columns, and one more at each of the four corners
+    assert starved_point_fraction(torn) == 0
+    assert point_part_area_ratio_min(torn) == 1

@@ -64,7 +64,7 @@ def test_a_cloud_that_shows_no_surface_says_so() -> None:
 
 
 def test_it_keeps_the_promises_of_a_method() -> None:
-    check_method(ComputedMap())
+    check_method(ComputedMap(points=1000))
 
 
 def test_no_network_takes_part() -> None:
@@ -85,6 +85,7 @@ def test_no_network_takes_part() -> None:
         ({"time_budget": 0}, "time_budget must be a number above 0"),
         ({"time_budget": math.inf}, "time_budget must be"),
         ({"components": "some"}, "components must be one of together, each, largest"),
+        ({"distortion": "none"}, "distortion must be one of conformal, balanced, isometric"),
         ({"seed": -1}, "seed must be a whole number of at least 0"),
     ],
 )
@@ -129,7 +130,7 @@ class Clock:
     def __init__(self, monkeypatch, pace: float, slow: float | None = None) -> None:
         self.now, self.counts, self.change = 100.0, [], lambda flat: flat
 
-        def timed(points: np.ndarray, _: float) -> FlatMap:
+        def timed(points: np.ndarray, _: float, __: str) -> FlatMap:
             self.counts.append(len(points))
             is_first = len(self.counts) == 1
             self.now += len(points) * (pace if is_first or slow is None else slow)

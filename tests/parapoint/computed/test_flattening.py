@@ -3,11 +3,9 @@ import pytest
 
 from benchmarks.cases.builtin import sphere, torus
 from parapoint.computed import flattening
-from parapoint.computed.bijection import signed_areas
 from parapoint.computed.flattening import (
     FlatMap,
     _chosen_copies,
-    _graph,
     _joined_loops,
     _scale_cuts,
     _seamed,
@@ -15,6 +13,8 @@ from parapoint.computed.flattening import (
     flat_map,
 )
 from parapoint.computed.reconstruction import ReconstructionError, triangulation
+from parapoint.planar.embedding import few_edges_graph
+from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.cutting import cut_along
 from parapoint.surfaces.surface import Mesh
 
@@ -260,7 +260,7 @@ def test_a_vertex_s_derivative_is_the_mean_of_its_faces_by_area() -> None:
 
 def test_a_cut_costs_its_length_and_its_edges() -> None:
     # The sides of a right triangle, 3, 4 and 5, each with their mean, 4.
-    graph = _graph(Mesh([[0, 0, 0], [3, 0, 0], [0, 4, 0]], [[0, 1, 2]])).toarray()
+    graph = few_edges_graph(Mesh([[0, 0, 0], [3, 0, 0], [0, 4, 0]], [[0, 1, 2]])).toarray()
     np.testing.assert_allclose(graph, [[0, 7, 8], [7, 0, 9], [8, 9, 0]])
 
 

@@ -2,9 +2,9 @@ import igl
 import numpy as np
 from scipy.spatial import Delaunay
 
-from parapoint.computed.bijection import signed_areas
 from parapoint.computed.layout import scaled_layout
 from parapoint.computed.scale import area_discrepancy, even_scale, log_scale
+from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 
 

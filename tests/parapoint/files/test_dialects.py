@@ -5,6 +5,7 @@ import gzip
 import json
 import struct
 from collections.abc import Sequence
+from contextvars import copy_context
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from parapoint import console
+from parapoint.cli import parapoint
 from parapoint.errors import InputError
 from parapoint.files.polygons import triangle_rows
 from parapoint.files.reading import read_parameterized, read_surface
@@ -78,6 +81,11 @@ def test_packed_files_are_refused_by_the_name_of_the_tool(
         "2\n1.5 2.25 -3\n4 5.5 6\n",
         "1\n1.5 2.25 -3\n1\n4 5.5 6\n",
         "1,50e0 2,25 -3\n4 5,5 6\n",
+        '"1,5";"2,25";"-3"\n"4,0";"5,5";"6,0"\n',
+        "Point_ID X Y Z\n7 1.5 2.25 -3\n9 4 5.5 6\n",
+        "z,y,x\n-3,2.25,1.5\n6,5.5,4\n",
+        "# intensity x y z\n9 1.5 2.25 -3\n8 4 5.5 6\n",
+        "//R;X;Y;Z\n9;1,5;2,25;-3\n8;4,0;5,5;6,0\n",
     ],
 )
 @pytest.mark.parametrize("ending", [".xyz", ".pts"])
@@ -92,6 +100,7 @@ def test_numbers_in_text(tmp_path: Path, text: str, ending: str) -> None:
         ("1,234.5 2,345.6 3,456.7\n", [1234.5, 2345.6, 3456.7]),
         ("1.234,5 2.345,6 3.456,7\n", [1234.5, 2345.6, 3456.7]),
         ("63,696 21,583 0,041\n", [63.696, 21.583, 0.041]),
+        ("1,234,567.5 2,345.25 3,000\n", [1234567.5, 2345.25, 3000]),
         ("1,2,3\n", [1, 2, 3]),
         ("1,-5,2,0,0,1\n", [1, -5, 2]),
         ("1.0,2.0,3.0 255,0,0\n", [1, 2, 3]),
@@ -101,6 +110,16 @@ def test_numbers_in_text(tmp_path: Path, text: str, ending: str) -> None:
 def test_commas_that_can_be_told(tmp_path: Path, text: str, point: Sequence[float]) -> None:
     """By what stands beside them."""
     assert_allclose(of_file(tmp_path, "a.xyz", text), [point])
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_numbers_of_rows_are_no_coordinates(tmp_path: Path, first: int, caplog: Any) -> None:
+    """As total stations write them; a grid whose first column counts is none."""
+    points = np.random.default_rng(0).normal(size=(5, 3))
+    rows = [f"{k + first} {x} {y} {z}\n" for k, (x, y, z) in enumerate(points)]
+    assert_allclose(of_file(tmp_path, "a.xyz", "".join(rows)), points)
+    assert "numbers the rows" in caplog.text
+    assert_allclose(of_file(tmp_path, "b.xyz", "0 0 5 1\n1 0 5 1\n2 0 5 1\n")[:, 0], [0, 1, 2])
 
 
 @pytest.mark.parametrize("text", ["1,5,2,5,3,5\n", "1,5,2,5,3,5,7\n", "1,5,2 3,5\n"])
@@ -280,3 +299,28 @@ def test_small_files_that_decode_to_much_are_refused(tmp_path: Path) -> None:
     path = glb(tmp_path, nodes=nodes, meshes=[{"primitives": primitives}])
     with pytest.raises(InputError, match="bytes that decode to"):
         read_surface(path)
+
+
+def test_memory_lifts_the_bound_on_what_files_decode_to(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Zeros a thousand times as large as their file."""
+    np.savez_compressed(tmp_path / "zeros.npz", points=np.zeros((3_000_000, 3)))
+    command = ["unwrap", str(tmp_path / "zeros.npz"), "--out", str(tmp_path / "a.ply")]
+    said = []
+    for options in ([], ["--memory", "1"], ["--memory", "-1"]):
+        with pytest.raises(SystemExit) as end:
+            copy_context().run(console.run, parapoint, [*command, *options])
+        assert end.value.code == 2
+        said.append(capsys.readouterr().err)
+    assert "or allow --memory 1 GB" in said[0]
+    assert "1 distinct points; a fit needs at least 100" in said[1]
+    assert "--memory must be" in said[2]
+
+
+def test_stl_with_notes_behind_its_triangles(tmp_path: Path) -> None:
+    """As some tools append; a text that says solid is a text."""
+    triangle = np.array([[0, 0, 1], [0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4").tobytes() + bytes(2)
+    data = bytes(80) + struct.pack("<I", 1) + triangle
+    for notes in (b"", b"colour=red", bytes(60)):
+        assert len(of_file(tmp_path, "a.stl", data + notes)) == 3

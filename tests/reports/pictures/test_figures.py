@@ -235,6 +235,7 @@ def test_no_broken_map_is_on_the_pareto_front(suite):
     points = trade_off_table(
         broken=(0.0, 0.0, False), a=(0.1, 0.5, True), b=(0.2, 0.2, True), worse=(0.3, 0.3, True),
         equal=(0.1, 0.6, True), c=(0.9, 0.1, True),
+        wide=(1.5, 0.1, True),
     )  # fmt: skip
     front = plots.pareto_front(suite, points)
     np.testing.assert_array_equal(front, [[0.1, 0.5], [0.2, 0.2], [0.9, 0.1]])

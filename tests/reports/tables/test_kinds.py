@@ -5,7 +5,7 @@ import pytest
 from reports.contents import contents
 from reports.tables.kinds import means_by_kind, success
 
-from ..conftest import DEVIL, HAND, NEFERTITI, seeded
+from ..conftest import DEVIL, HAND, NEFERTITI, Writer, flat, seeded, sheet
 
 
 def test_success_counts_skips_and_compares_on_common_models(results):
@@ -36,3 +36,20 @@ def test_a_value_that_is_missing_on_a_common_model_leaves_no_mean(tmp_path):
         rows["LSCM"]["seconds"] is None
     )  # the mean over one model would stand beside one over two
     assert rows["ParaPoint"]["seconds"] == 0.25
+
+
+def test_success_counts_usable_maps_alone_and_one_to_one_needs_every_seed(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for case in "abcd":
+            for seed in (0, 1):
+                writer.cell(case, sheet(), "lscm", {}, seed=seed, result=flat(sheet()))
+    suite = contents(tmp_path)[0]
+    means = suite.means
+    means["grade"] = ["usable", "flawed", "collapsed", "broken"]
+    means["bijective"] = [1.0, 0.5, 1.0, 0.0]  # of the second, one seed of two is one to one
+    (row,) = success(suite).blocks[0]
+    (name,) = {key.removesuffix(" usable") for key in row if key.endswith(" usable")}
+    assert row[f"{name} usable"] == "1/4"
+    assert row[f"{name} bijective"] == "2/4"
+    assert row[f"{name} ok"] == "4/4"

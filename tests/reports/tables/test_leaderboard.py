@@ -3,6 +3,7 @@ import json
 import pytest
 
 from reports.contents import (
+    ANGLE,
     AREA,
     POINT_ANGLE,
     POINT_AREA,
@@ -106,6 +107,13 @@ def test_the_page_shows_what_was_ranked_here(tmp_path):
     first = shown([one["entries"] for one in only["models"][0]["maps"]])
     assert [first[name][2] for name in ("Tutte", "LSCM", "ARAP")] == ["", "best", "second"]
     assert winner(made, "a", AREA).names == ("LSCM",)
+    angle = [metric["name"] for metric in given["metrics"]].index(ANGLE)
+    again = contents(tmp_path)[0]
+    again.means.loc[again.means["label"] == "LSCM", "grade"] = "collapsed"
+    maps = data([again])["suites"][0]["models"][0]["maps"]
+    lscm = maps[order.index("LSCM")]["entries"]
+    assert lscm[angle][0].endswith(" †")
+    assert (lscm[at][0].endswith(" †"), lscm[at][2]) == (False, "")
     rows = comparison(made, [AREA])
     marks = {cells[1].text: [cell.mark for cell in cells[2:6]] for cells in rows.cells[0]}
     assert marks["Tutte"] == [""] * 4
@@ -117,3 +125,39 @@ def test_a_definition_names_unit_weighting_and_source():
     for part in ("radians", "lower is better", "corners, unweighted", "ParaPoint, supplement"):
         assert part in told
     assert definition("nothing") == ""
+
+
+def test_the_page_tells_common_from_own_models_and_ranks_no_atlas(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for case in "abc":
+            for method in ("lscm", "arap", "xatlas"):
+                lost = (case, method) == ("c", "arap")
+                given = {"status": "failed", "reason": "no"} if lost else {}
+                result = None if lost else flat(sheet())
+                writer.cell(case, sheet(), method, {}, result=result, **given)
+    made = contents(tmp_path)[0]
+    means = made.means
+    means.loc[means["label"] == "xatlas", ["chart_count", AREA]] = 40.0, 0.0
+    means.loc[means["label"] == "LSCM", AREA] = [0.1, 0.2, 0.9]
+    means.loc[(means["label"] == "ARAP") & (means["case"] != "c"), AREA] = 0.3
+    assert made.atlases == {"xatlas"}
+    given = data([made])
+    at = [metric["name"] for metric in given["metrics"]].index(AREA)
+    (only,) = given["suites"]
+    order = [method["name"] for method in only["methods"]]
+    assert only["common"] == 2
+    found = {
+        over: {name: own[at][1:] for name, own in zip(order, entries, strict=True)}
+        for over, entries in only["summaries"]["mean"].items()
+    }
+    assert found["common"] == {"LSCM": (0.15, "best"), "ARAP": (0.3, "second"), "xatlas": (0, "")}
+    assert found["own"] == {"LSCM": (0.4, "second"), "ARAP": (0.3, "best"), "xatlas": (0, "")}
+    maps = [model["maps"] for model in only["models"]]
+    marks = {name: one["entries"][at][2] for name, one in zip(order, maps[0], strict=True)}
+    assert marks == {"LSCM": "best", "ARAP": "second", "xatlas": ""}
+    assert maps[2][order.index("ARAP")]["status"] == "failed"
+    assert winner(made, "a", AREA).names == ("LSCM",)
+    assert only["methods"][order.index("xatlas")]["detail"] == "many charts, not ranked"
+    assert only["methods"][order.index("ARAP")]["bad"] == "1 failed"
+    assert only["methods"][order.index("ARAP")]["reasons"] == "c: failed, no"

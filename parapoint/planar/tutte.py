@@ -6,8 +6,9 @@ import igl
 import numpy as np
 from scipy import sparse
 
+from parapoint.planar.domains import Domain, circle, closed_holes, scaled
+from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.surface import FloatArray, IntArray
-from parapoint.unwrapping.domains import Domain, circle, closed_holes, scaled, signed_areas
 
 
 def tutte(disk: Domain) -> FloatArray:

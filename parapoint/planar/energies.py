@@ -7,9 +7,9 @@ from collections.abc import Callable
 import igl
 import numpy as np
 
-from parapoint.computed.bijection import LARGE
+from parapoint.planar.domains import Domain
+from parapoint.planar.scaffold import LARGE
 from parapoint.surfaces.surface import FloatArray, IntArray
-from parapoint.unwrapping.domains import Domain
 
 Density = Callable[[FloatArray, FloatArray], FloatArray]
 
@@ -35,7 +35,7 @@ def stepper(
 ) -> Callable[[int], FloatArray]:
     """A function that takes so many more of libigl's steps and gives the map (V, 2).
 
-    The unit of the surface makes no difference: see `parapoint.computed.bijection.LARGE`.
+    The unit of the surface makes no difference: see `parapoint.planar.bijection.LARGE`.
 
     Args:
         disk: the surface.

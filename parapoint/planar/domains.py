@@ -11,6 +11,7 @@ from scipy.sparse import csgraph
 
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
+from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, Surface, flat_faces
 
 ROUNDING = 1e-6
@@ -116,11 +117,6 @@ def far_pair(points: FloatArray) -> tuple[int, int]:
 def _farthest(points: FloatArray, origin: FloatArray) -> int:
     squared = ((points - origin) ** 2).sum(axis=1)
     return int((squared >= (1 - ROUNDING) * squared.max()).argmax())
-
-
-def signed_areas(uv: FloatArray, faces: IntArray) -> FloatArray:
-    """(F,) area of each triangle in the plane, negative where it is turned over."""
-    return np.asarray(igl.doublearea(uv, faces) / 2, dtype=np.float64)
 
 
 def finite(uv: FloatArray) -> FloatArray:

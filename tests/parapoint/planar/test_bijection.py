@@ -3,16 +3,16 @@ import numpy as np
 import pytest
 
 from benchmarks.metrics.evaluation import evaluate
-from parapoint.computed import bijection
-from parapoint.computed.bijection import (
+from parapoint.computed.layout import scaled_layout
+from parapoint.computed.scale import even_scale
+from parapoint.planar import bijection, scaffold
+from parapoint.planar.bijection import (
     BijectionError,
     bijective_map,
     is_bijective,
     signed_areas,
-    tutte,
 )
-from parapoint.computed.layout import scaled_layout
-from parapoint.computed.scale import even_scale
+from parapoint.planar.embedding import tutte
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh
 
@@ -90,13 +90,13 @@ def test_a_map_that_is_held_up_sets_out_again(monkeypatch) -> None:
     mesh = ramp()
     layout = scaled_layout(mesh, even_scale(mesh))
     free = score(mesh, bijective_map(mesh, layout))
-    descended, energies = bijection._descended, []
+    descended, energies = bijection.descended, []
 
     def held_up_once(of, uv, energy, *rest):
         energies.append(energy)
         return uv if len(energies) == 1 else descended(of, uv, energy, *rest)
 
-    monkeypatch.setattr(bijection, "_descended", held_up_once)
+    monkeypatch.setattr(bijection, "descended", held_up_once)
     held_up = score(mesh, bijective_map(mesh, layout))
     isometric, conformal = igl.SYMMETRIC_DIRICHLET, igl.CONFORMAL
     assert energies == [isometric, conformal, isometric, conformal]
@@ -151,7 +151,7 @@ def test_the_descents_end_with_the_time_and_leave_what_they_have(monkeypatch) ->
     mesh = ramp()
     whole = bijective_map(mesh, None)
     steps = iter(range(1000))
-    monkeypatch.setattr(bijection.time, "monotonic", lambda: float(next(steps)))
+    monkeypatch.setattr(scaffold.time, "monotonic", lambda: float(next(steps)))
     some = bijective_map(
         mesh, None, deadline=4.5
     )  # five steps of the first descent, none of the others
@@ -170,14 +170,14 @@ def test_a_map_is_at_the_layout_when_it_is_that_and_not_merely_near(monkeypatch)
     x, y = np.meshgrid(np.linspace(0, 1, 9), np.linspace(0, 1, 9))
     mesh = Mesh(np.column_stack([x.ravel(), y.ravel(), np.zeros(81)]), grid(9, 9))
     start = tutte(mesh) / np.sqrt(np.pi)
-    assert 0.1 < bijection._excess(mesh, start, igl.SYMMETRIC_DIRICHLET) < 10
-    descended, calls = bijection._descended, []
+    assert 0.1 < bijection.excess(mesh, start, igl.SYMMETRIC_DIRICHLET) < 10
+    descended, calls = bijection.descended, []
 
     def held_up_once(of, uv, *rest):
         calls.append(uv)
         return uv if len(calls) == 1 else descended(of, uv, *rest)
 
-    monkeypatch.setattr(bijection, "_descended", held_up_once)
+    monkeypatch.setattr(bijection, "descended", held_up_once)
     led = bijection._led(mesh, mesh, start, np.inf)
     i, j = mesh.edges.T
     lengths = [np.linalg.norm(of[i] - of[j], axis=1) for of in (mesh.vertices, led)]

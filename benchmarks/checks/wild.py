@@ -1,0 +1,395 @@
+"""`python -m benchmarks.checks.wild`: files as other tools write them, family by family.
+
+Each file is made here by a few lines, so what it means is known. It must be read as it was meant;
+where that cannot be known, one line that refuses it is right too. Per family the command prints how
+many were read, refused and wrong, and exits with 1 if one is wrong: a refusal counts as wrong where
+the file can be understood.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import logging
+import struct
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import click
+import numpy as np
+
+from baselines import registry
+from benchmarks.metrics.evaluation import evaluate
+from parapoint import console
+from parapoint.commands.unwrapping import Request, unwrap_mesh
+from parapoint.computed.computed_map import ComputedMap
+from parapoint.errors import InputError
+from parapoint.files.reading import Polygons, read_parameterized, read_polygons, read_surface
+from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, unit_normals
+from parapoint.textures.placing import BORDER
+from parapoint.unwrapping.unwrap import Unwrap
+
+POINTS = np.array([[1.5, 2.25, -3], [4, 5.5, 6], [7, 8.25, 9]])
+SEED = 0
+
+
+class Case(NamedTuple):
+    """One file.
+
+    Attributes:
+        name: its name.
+        data: its bytes.
+        is_right: whether what is read from that path is what was meant.
+        may_refuse: whether one line that refuses it is right as well.
+    """
+
+    name: str
+    data: bytes
+    is_right: Callable[[Path], bool]
+    may_refuse: bool = False
+
+
+class Tally(NamedTuple):
+    """What became of the files of a family: numbers read and refused, names of the wrong ones."""
+
+    read: int
+    refused: int
+    wrong: list[str]
+
+
+def tally(cases: list[Case], folder: Path) -> Tally:
+    """Write and read each file of a family."""
+    read, refused, wrong = 0, 0, []
+    for case in cases:
+        path = folder / case.name
+        path.write_bytes(case.data)
+        try:
+            is_right = case.is_right(path)
+            read += is_right
+        except InputError:
+            refused += 1
+            is_right = case.may_refuse
+        if not is_right:
+            wrong.append(case.name)
+    return Tally(read, refused, wrong)
+
+
+def _shows(expected: FloatArray) -> Callable[[Path], bool]:
+    """Whether the points or vertices are these (N, 3)."""
+
+    def is_right(path: Path) -> bool:
+        surface = read_surface(path)
+        found = surface.vertices if isinstance(surface, Mesh) else surface.points
+        return found.shape == expected.shape and np.allclose(found, expected)
+
+    return is_right
+
+
+def _cannot_be_told(path: Path) -> bool:
+    """Read what one line must refuse."""
+    read_surface(path)
+    return False
+
+
+def commas() -> Iterator[Case]:
+    """Decimal commas, beside whatever parts the numbers."""
+    text = ["\n".join(" ".join(f"{x:g}" for x in row) for row in POINTS)]
+    decimal = text[0].replace(".", ",")
+    variants = {
+        "blanks": decimal,
+        "tabs": decimal.replace(" ", "\t"),
+        "semicolons": decimal.replace(" ", ";"),
+        "spaced": decimal.replace(" ", ", "),
+        "heading": "X;Y;Z\n" + decimal.replace(" ", ";"),
+        "quoted": "\n".join(
+            ";".join(f'"{word}"' for word in line.split()) for line in decimal.splitlines()
+        ),
+        "csv": text[0].replace(" ", ","),
+    }
+    for name, lines in variants.items():
+        yield Case(f"{name}.xyz", lines.encode(), _shows(POINTS))
+    yield Case("untold.xyz", b"1,5,2,5,3,5\n" * 3, _cannot_be_told, may_refuse=True)
+
+
+def marks() -> Iterator[Case]:
+    """Byte order marks and wide characters before each text format."""
+    triangle = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    obj = "".join(f"v {x} {y} {z}\n" for x, y, z in triangle) + "f 1 2 3\n"
+    off = "OFF\n3 1 0\n" + "".join(f"{x} {y} {z}\n" for x, y, z in triangle) + "3 0 1 2\n"
+    ply = "ply\nformat ascii 1.0\nelement vertex 3\n" + "".join(
+        f"property float {name}\n" for name in "xyz"
+    )
+    ply += "end_header\n" + "".join(f"{x} {y} {z}\n" for x, y, z in triangle)
+    xyz = "".join(f"{x} {y} {z}\n" for x, y, z in triangle)
+    for ending, text in {".obj": obj, ".off": off, ".ply": ply, ".xyz": xyz, ".pts": xyz}.items():
+        for encoding in ("utf-8-sig", "utf-16", "utf-32"):
+            yield Case(f"{encoding}{ending}", text.encode(encoding), _shows(triangle))
+
+
+def polygons() -> Iterator[Case]:
+    """Concave and bridged polygons, cut into triangles that do not fold."""
+    turn = 2 * np.pi * np.arange(24) / 24
+    flower = np.stack([np.cos(turn), np.sin(turn)], 1) * (1 + 0.4 * np.cos(6 * turn))[:, None]
+    shapes: dict[str, Any] = {
+        "l": [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)],
+        "arrow": [(0, 0), (2, 1), (0, 2), (0.5, 1)],
+        "keyhole": [
+            *[(0, 0), (4, 0), (4, 4), (0, 4), (0, 0)],
+            *[(1, 1), (1, 3), (3, 3), (3, 1), (1, 1)],
+        ],
+        "comb": [(0, 0), (11, 0), *((11 - k, 1 if k % 2 else 5) for k in range(12))],
+        "flower": flower,
+    }
+    for name, shape in shapes.items():
+        x, y = np.array(shape, dtype=float).T
+        area = abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1))) / 2
+        for first in (0, 2):
+            order = np.roll(np.arange(len(x)), first)
+            lines = [f"v {x[k]} {y[k]} 0" for k in order] + [f"vt {x[k]} {y[k]}" for k in order]
+            corners = " ".join(f"{k}/{k}" for k in range(1, len(x) + 1))
+            data = "\n".join([*lines, f"f {corners}\n"]).encode()
+            yield Case(f"{name}{first}.obj", data, partial(_is_flat, area=area))
+
+
+def _is_flat(path: Path, area: float) -> bool:
+    """Whether the map of a flat shape onto itself is perfect, and the area right."""
+    mesh, flat = read_parameterized(path)
+    values = evaluate(mesh, flat)
+    perfect = values["flipped_fraction"] == values["overlapped_fraction"] == 0
+    return bool(perfect and np.isclose(mesh.face_areas.sum(), area))
+
+
+def split_vertices() -> Iterator[Case]:
+    """A tube cut along a line, its vertices doubled there or at each corner, or rounded."""
+    i, j = np.meshgrid(np.arange(13), np.arange(5), indexing="ij")
+    uv = np.stack([i / 12, j / 4], axis=2).reshape(-1, 2)
+    angle = 2 * np.pi * uv[:, 0]
+    vertices = np.stack([np.cos(angle), np.sin(angle), 4 * uv[:, 1]], axis=1)
+    row = np.arange(65).reshape(13, 5)
+    a, b, c, d = row[:-1, :-1], row[1:, :-1], row[1:, 1:], row[:-1, 1:]
+    faces = np.concatenate([np.stack(of, axis=-1).reshape(-1, 3) for of in ((a, b, c), (a, c, d))])
+    corner = np.arange(faces.size).reshape(-1, 3)
+    soup = vertices[faces].reshape(-1, 3), uv[faces].reshape(-1, 2), corner
+    rounded = vertices.astype(np.float32).astype(float), uv, faces
+    for name, (points, images, rows) in {
+        "doubled": (vertices, uv, faces),
+        "soup": soup,
+        "rounded": rounded,
+    }.items():
+        yield Case(f"{name}.obj", _obj(points, images, rows), _is_tube)
+        yield Case(
+            f"{name}.npz", _npz(vertices=points, faces=rows, uv=images, corners=rows), _is_tube
+        )
+        yield Case(f"{name}.gltf", _gltf(points, images, rows), _is_tube)
+
+
+def _is_tube(path: Path) -> bool:
+    """One chart, its seam one line along the tube."""
+    mesh, flat = read_parameterized(path)
+    values = evaluate(mesh, flat)
+    seam = 4 / np.sqrt(mesh.face_areas.sum())
+    return values["chart_count"] == 1 and bool(np.isclose(values["seam_length"], seam, rtol=1e-4))
+
+
+def _obj(vertices: FloatArray, uv: FloatArray, faces: IntArray) -> bytes:
+    lines = ["v {} {} {}".format(*row) for row in vertices.tolist()]
+    lines += ["vt {} {}".format(*row) for row in uv.tolist()]
+    lines += ["f " + " ".join(f"{k}/{k}" for k in row) for row in (faces + 1).tolist()]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _npz(**arrays: Any) -> bytes:
+    with tempfile.TemporaryFile() as file:
+        np.savez(file, **arrays)
+        file.seek(0)
+        return file.read()
+
+
+def _gltf(vertices: FloatArray, uv: FloatArray, faces: IntArray, **changes: Any) -> bytes:
+    """A glTF file with its buffer inside; glTF's v runs downwards."""
+    blocks = [
+        vertices.astype("<f4").tobytes(),
+        (uv * [1, -1] + [0, 1]).astype("<f4").tobytes(),
+        faces.astype("<u4").tobytes(),
+    ]
+    starts = np.cumsum([0, *map(len, blocks)]).tolist()
+    uri = "data:application/octet-stream;base64," + base64.b64encode(b"".join(blocks)).decode()
+    counts = [(5126, len(vertices), "VEC3"), (5126, len(uv), "VEC2"), (5125, faces.size, "SCALAR")]
+    tree: dict[str, Any] = {
+        "asset": {"version": "2.0"},
+        "buffers": [{"uri": uri, "byteLength": starts[-1]}],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": at, "byteLength": len(block)}
+            for at, block in zip(starts, blocks, strict=False)
+        ],
+        "accessors": [
+            {"bufferView": k, "componentType": kind, "count": count, "type": shape}
+            for k, (kind, count, shape) in enumerate(counts)
+        ],
+        "meshes": [
+            {"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "indices": 2}]}
+        ],
+        "nodes": [{"mesh": 0}],
+        "scenes": [{"nodes": [0]}],
+        "scene": 0,
+    }
+    return json.dumps(tree | changes).encode()
+
+
+def gltf() -> Iterator[Case]:
+    """Nodes that mirror, extensions that are needed, instances."""
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    given = square, square[:, :2], np.array([[0, 1, 2], [0, 2, 3]])
+    moved = {"translation": [5, 0, 0]}
+    for name, nodes, faces, area in (
+        ("plain", [{"mesh": 0}], 2, 1),
+        ("mirrored", [{"mesh": 0, "scale": [-1, 1, 1]}], 2, 1),
+        ("scaled", [{"mesh": 0, "scale": [2, 3, 1]}], 2, 6),
+        ("twice", [{"mesh": 0}, {"mesh": 0, **moved}], 4, 2),
+        ("nested", [{"children": [1], "scale": [2, 2, 2]}, {"mesh": 0, **moved}], 2, 4),
+    ):
+        roots = [0, 1] if name == "twice" else [0]
+        data = _gltf(*given, nodes=nodes, scenes=[{"nodes": roots}])
+        yield Case(f"{name}.gltf", data, partial(_faces_up, faces=faces, area=area))
+    for name in ("KHR_draco_mesh_compression", "EXT_meshopt_compression"):
+        data = _gltf(*given, extensionsRequired=[name])
+        yield Case(f"{name}.gltf", data, _cannot_be_told, may_refuse=True)
+
+
+def _faces_up(path: Path, faces: int, area: float) -> bool:
+    """Whether there are so many faces of this area together, all seen from above."""
+    mesh, flat = read_parameterized(path)
+    up = unit_normals(mesh.vertices, mesh.faces)[:, 2]
+    whole = len(flat.corners) == len(mesh.faces) == faces and (up > 0).all()
+    return bool(whole and np.isclose(mesh.face_areas.sum(), area))
+
+
+def written() -> Iterator[Case]:
+    """Pyramids, which are at SLIM's minimum as they start, unwrapped and read back."""
+    for sides, ending in enumerate((".ply", ".npz", ".glb", ".obj", ".ply"), start=3):
+        turn = 2 * np.pi * np.arange(sides) / sides
+        rim = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+        lines = ["v {} {} {}".format(*row) for row in [[0.0, 0, 1], *rim.tolist()]]
+        lines += [f"f 1 {k + 2} {(k + 1) % sides + 2}" for k in range(sides)]
+        inner = np.cos(np.pi / sides)  # distance of a side of the rim from its middle
+        area = sides * np.sin(np.pi / sides) * np.hypot(1, inner)
+        is_right = partial(_is_written, ending=ending, faces=sides, area=area)
+        yield Case(f"pyramid_{sides}.obj", ("\n".join(lines) + "\n").encode(), is_right)
+
+
+def _is_written(path: Path, ending: str, faces: int, area: float) -> bool:
+    """Whether SLIM maps the surface, and `unwrap` writes it with its faces, turned as they are."""
+    given = read_polygons(path)
+    assert isinstance(given, Polygons)
+    registry.method("slim")[1].parameterize(given.mesh, seed=SEED)
+    out = path.with_name(f"{path.stem}_out{ending}")
+    unwrap_mesh(given, Request(str(path), str(out), 256, BORDER, Unwrap(), SEED))
+    turned = evaluate(*read_parameterized(out))["mirrored_area_fraction"]
+    return turned == 0 and _faces_up(out, faces, area)
+
+
+def _dome(count: int = 400) -> FloatArray:
+    points = np.random.default_rng(SEED).normal(size=(count, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    points[:, 2] = np.abs(points[:, 2])
+    return points
+
+
+def strays() -> Iterator[Case]:
+    """Flying pixels, and rows without data, in the last rows."""
+    rng = np.random.default_rng(SEED)
+    far = rng.normal(size=(12, 3))
+    far /= np.linalg.norm(far, axis=1, keepdims=True)
+    away = np.array([5e5, 5e6, 100.0])
+    for name, points, rows in (
+        ("one_30", _dome(), 30 * far[:1]),
+        ("some_500", _dome(), 500 * far),
+        ("some_million", _dome(), 1e6 * far),
+        ("zeros", _dome() + away, np.zeros((20, 3))),
+        ("nodata", _dome(), np.full((20, 3), -9999.0)),
+        ("none", _dome(), np.zeros((0, 3))),
+    ):
+        data = _text(np.concatenate([points, rows]))
+        yield Case(f"{name}.xyz", data, partial(_has_strays, count=len(rows)))
+
+
+def _text(points: FloatArray) -> bytes:
+    return "".join("{} {} {}\n".format(*row) for row in points.tolist()).encode()
+
+
+def _has_strays(path: Path, count: int) -> bool:
+    """Whether so many rows are left out, and no point off the surface that was found."""
+    report = ComputedMap().fit(read_surface(path)).report_
+    return report["strays"] == count and report["anchors"] == report["points"]
+
+
+def scan_lines() -> Iterator[Case]:
+    """Lines much farther apart than the points on them; beyond 1:30 advice is right too."""
+    for gap in (1, 8, 12, 20, 30, 100):
+        x, y = np.meshgrid(np.arange(120.0), gap * np.arange(8.0))
+        x += np.random.default_rng(SEED).uniform(0, 1, (8, 1))
+        points = np.stack([x, y, 5 * np.sin(x / 30)], axis=2).reshape(-1, 3)
+        yield Case(
+            f"lines_{gap}.xyz",
+            _text(points),
+            partial(_has_strays, count=0),
+            may_refuse=gap > 30,
+        )
+
+
+def pcd() -> Iterator[Case]:
+    """Padding, sizes without POINTS, and types, as drivers of lidars write them."""
+    for name, fields, sizes, types, counts, kind in (
+        ("plain", "x y z", "4 4 4", "F F F", "1 1 1", "<3f"),
+        ("doubles", "x y z", "8 8 8", "F F F", "1 1 1", "<3d"),
+        ("turned", "z y x", "4 4 4", "F F F", "1 1 1", "<3f"),
+        ("count0", "x y z _", "4 4 4 1", "F F F U", "1 1 1 0", "<3f"),
+        ("padded", "x y z _", "4 4 4 1", "F F F U", "1 1 1 5", "<3f5x"),
+        ("ring", "x y z ring", "4 4 4 2", "F F F U", "1 1 1 1", "<3f2x"),
+    ):
+        rows = POINTS[:, ::-1] if name == "turned" else POINTS
+        head = f"VERSION .7\nFIELDS {fields}\nSIZE {sizes}\nTYPE {types}\nCOUNT {counts}\n"
+        for ends, size in (("points", "WIDTH 3\nHEIGHT 1\nPOINTS 3\n"), ("width", "WIDTH 3\n")):
+            data = (head + size + "DATA binary\n").encode()
+            data += b"".join(struct.pack(kind, *row) for row in rows.tolist())
+            yield Case(f"{name}_{ends}.pcd", data, _shows(POINTS))
+
+
+FAMILIES: dict[str, Callable[[], Iterator[Case]]] = {
+    "split vertices": split_vertices,
+    "strays": strays,
+    "polygons": polygons,
+    "glTF": gltf,
+    "commas": commas,
+    "marks": marks,
+    "scan lines": scan_lines,
+    "PCD": pcd,
+    "written": written,
+}
+"""The files of each family."""
+
+
+@click.command()
+def main() -> None:
+    """Read files as other tools write them; exit with 1 if one is read wrong."""
+    logging.basicConfig(level=logging.ERROR, format="%(message)s")
+    faults = 0
+    with tempfile.TemporaryDirectory() as folder:
+        for family, cases in FAMILIES.items():
+            made = list(cases())
+            found = tally(made, Path(folder))
+            faults += len(found.wrong)
+            print(
+                f"{family}: {len(made)} files, {found.read} read, {found.refused} refused "
+                f"({found.refused / len(made):.0%}), wrong: {', '.join(found.wrong) or 'none'}"
+            )
+    if faults:
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    console.run(main)

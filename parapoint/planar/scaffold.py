@@ -1,0 +1,173 @@
+"""Descent of an energy of a map of a planar domain that stays one to one.
+
+The space around the map is triangulated too and kept from turning over, so that the boundary never
+crosses itself (Jiang, Schaefer and Panozzo 2017, "Simplicial complex augmentation framework for
+bijective maps"; libigl has it, on J. R. Shewchuk's Triangle).
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+
+import igl
+import numpy as np
+from igl import triangle
+
+from parapoint.surfaces.areas import signed_areas
+from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
+
+LEAST_GAIN = 0.02
+"""A descent ends when a step lowers the energy's excess by less than this share of it."""
+EXACT = 1e-14
+"""Excess of energy that is none, in units of its least value."""
+MOST_STEPS = 50
+"""Steps of a descent at most."""
+OPENING_STEPS = 100
+"""As MOST_STEPS, where a cut has to open first."""
+PATIENCE = 20
+"""Steps in which a cut may open before the energy falls by LEAST_GAIN."""
+OPENING = 0.3
+"""How far the two sides of a new cut are moved apart, in the least height of the triangles there;
+at less than a half no triangle turns over."""
+LARGE = 1e4
+"""The side of the map on which libigl works: its line search takes a change of area of less than
+1e-10 for none, and would turn over the small faces of a map of side 1."""
+
+
+def of_area_one(vertices: FloatArray, faces: IntArray) -> Mesh:
+    """The mesh scaled to an area of 1; a mesh without area stays as it is."""
+    area = Mesh(vertices, faces).face_areas.sum()
+    return Mesh(vertices / (np.sqrt(area) or 1.0), faces)
+
+
+def descended(
+    mesh: Mesh,
+    uv: FloatArray,
+    energy: igl.MappingEnergyType,
+    least: float = EXACT,
+    deadline: float = math.inf,
+) -> FloatArray:
+    """The map `uv` (V, 2), one to one, moved down an energy by steps that gain `least` each.
+
+    Args:
+        mesh: the domain, of area 1.
+        uv: (V, 2) a map of it, one to one, of area 1 or so.
+        energy: libigl's name of the energy.
+        least: fall of the excess that a step must bring, beside LEAST_GAIN.
+        deadline: no step begins after this time of `time.monotonic`.
+    """
+    before = np.inf
+    for moved in steps_down(mesh, uv, energy, deadline):
+        uv, after = moved, excess(mesh, moved, energy)
+        if not before - after > LEAST_GAIN * after + least:
+            break
+        before = after
+    return uv
+
+
+def cut_opened(
+    mesh: Mesh,
+    uv: FloatArray,
+    energy: igl.MappingEnergyType,
+    deadline: float = math.inf,
+) -> FloatArray:
+    """A map (V, 2) whose boundary touches itself along a new cut moved down an energy.
+
+    Args:
+        mesh: the domain after the cut, of area 1.
+        uv: (V, 2) the map before the cut, one to one but for the copies of the cut's vertices.
+        energy: libigl's name of the energy.
+        deadline: no step begins after this time of `time.monotonic`.
+    """
+    _, place, copies = np.unique(uv, axis=0, return_inverse=True, return_counts=True)
+    uv = moved_apart(mesh, uv, copies[place.reshape(-1)] > 1)
+    course = [excess(mesh, uv, energy)]
+    for moved in steps_down(mesh, uv, energy, deadline, OPENING_STEPS):
+        uv = moved
+        course.append(excess(mesh, uv, energy))
+        if len(course) > PATIENCE and course[-1] > (1 - LEAST_GAIN) * course[-1 - PATIENCE]:
+            break
+    return uv
+
+
+def moved_apart(mesh: Mesh, uv: FloatArray, is_copied: BoolArray) -> FloatArray:
+    """The map (V, 2) with the copies of a new cut's vertices moved into their own side each.
+
+    They move along the line that halves the angle of the boundary there, by OPENING.
+
+    Args:
+        mesh: a planar domain, faces counter-clockwise.
+        uv: (V, 2) a map of it without flips.
+        is_copied: (V,) the vertices of the cut, but for its tip.
+    """
+    size = len(mesh.vertices)
+    rim = mesh.halfedges[mesh.edge_face_count[mesh.edge_of_halfedge] == 1]
+    ahead, back = np.zeros((size, 2)), np.zeros((size, 2))
+    ahead[rim[:, 0]] = uv[rim[:, 1]] - uv[rim[:, 0]]
+    back[rim[:, 1]] = uv[rim[:, 0]] - uv[rim[:, 1]]
+    start = np.arctan2(ahead[:, 1], ahead[:, 0])
+    turn = (np.arctan2(back[:, 1], back[:, 0]) - start) % (2 * np.pi)
+    inwards = start + turn / 2
+    corners = uv[mesh.faces]
+    longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
+    heights = np.repeat(2 * signed_areas(uv, mesh.faces) / longest, 3)
+    least = np.full(size, np.inf)
+    np.minimum.at(least, mesh.faces.reshape(-1), heights)
+    step = OPENING * np.where(is_copied, least, 0.0)
+    return np.asarray(uv + step[:, None] * np.stack([np.cos(inwards), np.sin(inwards)], axis=1))
+
+
+def steps_down(
+    mesh: Mesh,
+    uv: FloatArray,
+    energy: igl.MappingEnergyType,
+    deadline: float = math.inf,
+    most: int = MOST_STEPS,
+) -> Iterator[FloatArray]:
+    """The maps (V, 2) after each of at most `most` steps; none after one that fails."""
+    state = triangle.SCAFData()
+    triangle.scaf_precompute(
+        np.asfortranarray(LARGE * mesh.vertices),
+        np.asfortranarray(mesh.faces.astype(np.int32)),
+        np.asfortranarray(LARGE * uv),
+        energy,
+        np.zeros(0, dtype=np.int32),
+        np.zeros((0, 2), order="F"),
+        0.0,
+        state,
+    )
+    for _ in range(most):
+        if time.monotonic() > deadline:
+            return
+        moved = np.array(triangle.scaf_solve(1, state)[:, :2]) / LARGE
+        if not (signed_areas(moved, mesh.faces) > 0).all():  # nor if not a number
+            return
+        yield moved
+
+
+def excess(mesh: Mesh, uv: FloatArray, energy: igl.MappingEnergyType) -> float:
+    """The mean of an energy over the area, above its least value, in units of this."""
+    area = mesh.face_areas
+    return float(energy_densities(mesh, uv, energy) @ area / area.sum()) - 1
+
+
+def energy_densities(mesh: Mesh, uv: FloatArray, energy: igl.MappingEnergyType) -> FloatArray:
+    """(F,) an energy of each triangle's map, in units of its least value."""
+    faces = mesh.faces
+    edges = [
+        np.linalg.norm(of[faces[:, i]] - of[faces[:, j]], axis=1)
+        for i, j in ((1, 2), (2, 0), (0, 1))
+        for of in (mesh.vertices, uv)
+    ]
+    area, image = mesh.face_areas, np.abs(signed_areas(uv, faces))
+    a, a_uv, b, b_uv, c, c_uv = (edge**2 for edge in edges)
+    # σ1² + σ2² of the map that takes a triangle of sides a, b, c to one of other sides.
+    squares = (a_uv * (b + c - a) + b_uv * (c + a - b) + c_uv * (a + b - c)) / (8 * area**2)
+    product = image / area
+    if energy == igl.CONFORMAL:
+        return np.asarray(squares / (2 * product))
+    if energy == igl.SYMMETRIC_DIRICHLET:
+        return np.asarray(squares * (1 + 1 / product**2) / 4)
+    raise ValueError(f"no formula for {energy}")

@@ -1,0 +1,55 @@
+"""Parts that a conformal map shrinks to nothing, and what becomes of them."""
+
+import numpy as np
+import pytest
+
+from benchmarks.cases import builtin
+from benchmarks.metrics.evaluation import evaluate
+from parapoint.computed.flattening import flattened
+from parapoint.computed.parts import MOST_STARVED, parts_kept
+from parapoint.planar.bijection import bijective_map, is_bijective
+from parapoint.surfaces.areas import starved_share
+from parapoint.surfaces.parameterization import Parameterization
+from parapoint.surfaces.surface import FloatArray, Mesh
+
+
+@pytest.fixture(scope="module")
+def conformal() -> tuple[Mesh, FloatArray]:
+    """A disk with a finger at its middle, and its conformal map."""
+    mesh = builtin.finger()
+    return mesh, bijective_map(mesh, None)
+
+
+def test_a_finger_is_starved_by_the_conformal_map_alone(conformal) -> None:
+    found = {}
+    for distortion in ("conformal", "balanced", "isometric"):
+        disk, uv = parts_kept(*conformal, distortion)
+        assert is_bijective(disk, uv)
+        share = starved_share(disk, uv)
+        assert (share > 0.2) if distortion == "conformal" else (share <= MOST_STARVED)
+        found[distortion] = evaluate(disk, Parameterization(uv, disk.faces))
+    assert found["conformal"]["part_area_ratio_min"] < 1
+    assert found["balanced"]["part_area_ratio_min"] == 1
+    # Of those that keep every part, the balanced map has the better angles, the other the energy.
+    angle = {name: values["angle_difference_mean"] for name, values in found.items()}
+    energy = {name: values["symmetric_dirichlet"] for name, values in found.items()}
+    assert angle["balanced"] < angle["isometric"]
+    assert energy["isometric"] <= energy["balanced"] < energy["conformal"]
+
+
+def test_the_same_at_every_scale(conformal) -> None:
+    scale = 2.0**12
+    mesh, flat = conformal
+    small, uv = parts_kept(mesh, flat, "balanced")
+    large, scaled = parts_kept(Mesh(scale * mesh.vertices, mesh.faces), scale * flat, "balanced")
+    np.testing.assert_array_equal(small.faces, large.faces)
+    np.testing.assert_allclose(scaled / scale, uv, atol=1e-6)
+
+
+def test_a_map_that_starves_nothing_stays_conformal() -> None:
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-1, 1, (400, 2))
+    flat = flattened(np.column_stack([points, 0.1 * points[:, 0] ** 2]))
+    disk, uv = parts_kept(flat.disk, flat.uv, "balanced")
+    assert disk is flat.disk
+    assert uv is flat.uv
