@@ -288,7 +288,7 @@ class Contents:
 
     @cached_property
     def means(self) -> pd.DataFrame:
-        """One row a (case, label): means over the seeds that ended well, and counts.
+        """One row a (case, label): means over the seeds that gave a map, and counts.
 
         Columns: case, label, ok, tried, skipped, status, reason, preprocessing, grade (the worst of
         the seeds), TIMES, metrics. A skipped cell was not tried.

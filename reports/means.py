@@ -37,7 +37,7 @@ def own_values(
 
 
 def common_cases(contents: Contents, cases: Sequence[str], metric: str = "") -> list[str]:
-    """Those of `cases` on which every method that ends well on any of them does.
+    """Those of `cases` on which every method gave a map that gives one on any of them.
 
     Nobody gains by failing on the hard ones. With a `metric`, models of which it is not defined,
     such as angles of faces on a cloud of points, are left out first.

@@ -52,7 +52,7 @@ class Group:
     Attributes:
         short: the method's name in tables.
         rows: by seed.
-        values: (n,) values over the seeds that ended well, by metric; and "seconds".
+        values: (n,) values over the seeds that gave a map, by metric; and "seconds".
     """
 
     short: str
@@ -72,7 +72,7 @@ class Group:
 
     @property
     def reason(self) -> str:
-        """Why one did not end well."""
+        """Why a seed gave no map; "" where all gave one."""
         return next((row.reason for row in self.rows.values() if row.status != "ok"), "")
 
 
@@ -246,7 +246,7 @@ class Comparison:
         return ONE_SEED * size, f"one seed: {ONE_SEED:.0%}"
 
     def changed_maps(self) -> list[Key]:
-        """Deterministic cells whose map is not bit for bit what it was, both having ended well."""
+        """Deterministic cells whose map is not bit for bit what it was, both folders having one."""
         return [
             key
             for key in self.shared

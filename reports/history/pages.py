@@ -46,5 +46,5 @@ def said(found: Comparison) -> str:
     times = f"{len(found.times)} times moved" if found.same_hardware else "times are not comparable"
     return (
         f"Of {len(found.shared)} cells in both, {len(moves)} moved beyond noise, {len(worse)} of "
-        f"them for the worse in some metric; {ends} ended otherwise; {times}."
+        f"them for the worse in some metric; another status in {ends}; {times}."
     )

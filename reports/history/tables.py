@@ -1,4 +1,4 @@
-"""The tables of a comparison: what moved, cell by cell, what ended otherwise, what is new."""
+"""The tables of a comparison: what moved, what has another status, what is new."""
 
 from __future__ import annotations
 
@@ -53,16 +53,17 @@ def summary(found: Comparison) -> Table:
         name="summary",
         title="What moved",
         caption=(
-            "Cells that are in both folders, seeds together: those with the very same maps, those "
-            "that ended otherwise, those of which some metric moved beyond noise for the better, "
-            "for the worse, or both ways; and the time after over the time before (geometric mean)."
+            "Counts of the cells that are in both folders, all seeds of a cell as one: those with "
+            "the very same maps, with another status, and those of which some metric moved "
+            "beyond noise, for the better, for the worse or both ways. The time ratio is the time "
+            "after over the time before (geometric mean)."
         ),
         columns=(
             Column("suite", "Suite", text=True, once=True),
             Column("method", "Method", text=True),
             Column("cells", "cells", digits=0),
             Column("maps", "same maps", digits=0),
-            Column("status", "ended otherwise", digits=0),
+            Column("status", "other status", digits=0),
             Column("better", "better", digits=0),
             Column("worse", "worse", digits=0),
             Column("mixed", "both ways", digits=0),
@@ -131,7 +132,7 @@ def moved(found: Comparison) -> Table | None:
         name="moved",
         title="Beyond noise, cell by cell",
         caption=(
-            "Every value that moved by more than its noise: means over the seeds that ended well. "
+            "Every value that moved by more than its noise: means over the seeds that gave a map. "
             "Changed: the method's own source, or the surface it was given."
         ),
         columns=(
@@ -159,7 +160,7 @@ def _changed(old: Group, new: Group) -> str:
 
 
 def ended(found: Comparison) -> Table | None:
-    """Cells that ended otherwise than before, with the reasons; None where none did."""
+    """Cells with another status than before, and why; None where there are none."""
     rows = []
     for key in found.shared:
         old, new = found.group(key)
@@ -176,8 +177,8 @@ def ended(found: Comparison) -> Table | None:
         return None
     return Table(
         name="ended",
-        title="Ended otherwise",
-        caption="Cells that did not end as they had, and why: after, or else before.",
+        title="Another status",
+        caption="The reason is the one after, or the one before where there is none after.",
         columns=(
             *_NAMES,
             Column("before", "before", text=True),

@@ -67,7 +67,7 @@ class Example:
         name: of the method.
         pictures: addresses: one view, or two where some faces are flipped.
         said: grade and share of flipped faces; of a cell without a map, how it ended.
-        mark: "bad" for what is no map, broken or collapsed; else "".
+        mark: "bad" where there is no map, or a broken or collapsed one; else "".
     """
 
     name: str
@@ -108,7 +108,7 @@ class Section:
     Attributes:
         report: the folder of the report.
         contents: its cells.
-        tables: the one to read first first.
+        tables: in the order in which to read them.
         figures: those that were drawn.
         faults: what could not be drawn, and why.
     """
@@ -146,7 +146,7 @@ class Section:
 
     @property
     def unfinished(self) -> list[ResultRow]:
-        """The cells that did not end well."""
+        """The cells without a map."""
         return [row for row in self.contents.rows if row.status != "ok"]
 
     @property
@@ -315,7 +315,7 @@ class Section:
                     vertices, faces = len(surface.vertices), len(surface.faces)
                     return f"{vertices:,} vertices, {faces:,} faces; {surface.topology}."
                 return f"A cloud of {len(surface.points):,} points."
-        return "The model is not at hand."
+        return "The model could not be had."
 
     @property
     def command(self) -> str:

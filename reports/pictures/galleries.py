@@ -104,7 +104,7 @@ def models(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure:
         if surface is not None:
             size = f"{len(surface.faces):,} faces, {surface.topology}"
         else:
-            size = "a cloud of points" if case in contents.clouds else "not at hand"
+            size = "a cloud of points" if case in contents.clouds else "could not be had"
         middle = (x0 + side + gap / 2) / width
         made.text(middle, (y0 - 0.04) / height, case, ha="center", va="top", fontsize=8.5)
         made.text(

@@ -30,7 +30,7 @@ def kind(contents: Contents, case: str) -> str:
     if entry is not None and entry.set in {"wild", "scans"}:
         return {"wild": "defective", "scans": "scans"}[entry.set]
     mesh = None if entry else contents.mesh(case)
-    topology = entry.topology if entry else mesh.topology if mesh else "not at hand"
+    topology = entry.topology if entry else mesh.topology if mesh else "unknown"
     known = {"disk": "disk", "sphere": "closed, genus 0"}
     if topology.endswith("no boundary"):
         return "closed, handles"
@@ -48,7 +48,7 @@ def kinds(contents: Contents) -> dict[str, list[str]]:
 
 
 def success(contents: Contents) -> Table:
-    """Methods × kinds of surface: how often each ends well, and with a map that is one to one."""
+    """How often each method gives a map, a usable one, one that is one to one, kind by kind."""
     groups = {"all": contents.cases} | kinds(contents)
     if len(groups) == 2:  # one kind, which is all
         del groups["all"]
@@ -75,10 +75,11 @@ def success(contents: Contents) -> Table:
         name="success",
         title="Success by kind of surface",
         caption=(
-            "By kind of surface (number of models): how many maps are usable, which alone is a "
-            "success; on how many models the method ended well with "
-            "at least one seed, and on how many of them its maps are one to one (no face flipped, "
-            "degenerate or over another); of those it was asked for, skipped ones included."
+            "Each head names a kind of surface and the number of its models. A success is a usable "
+            "map. Beside the successes stand the models on which the method gave any map (ok), "
+            "with at least one seed, and those on which all its maps are one to one: no face is "
+            "flipped, degenerate or over another. All are counted of the models that the method "
+            "was asked for, those that it skipped included."
         ),
         columns=tuple(columns),
         blocks=(tuple(rows),),
@@ -128,8 +129,9 @@ def means_by_kind(contents: Contents) -> Table:
         name="kinds",
         title="Means by kind of surface",
         caption=(
-            "Means over the models of a kind on which every method that ever ends well on this "
-            "kind did, so that nobody gains by failing; ok: on how many the method ended well."
+            "Means over the models on which every method gave a map that gives one anywhere on "
+            "this kind of surface, so that nobody gains by failing. The last column counts those "
+            "on which the method gave a map."
         ),
         columns=(
             Column("kind", "Surface", text=True, once=True),

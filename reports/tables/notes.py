@@ -87,7 +87,7 @@ def method_notes(contents: Contents) -> list[str]:
 
 
 def failure_notes(contents: Contents) -> list[str]:
-    """One line a way in which cells did not end well."""
+    """A line for each way in which cells gave no map."""
     reasons: dict[tuple[str, str, str], list[str]] = {}
     for row in contents.rows:
         if row.status != "ok":

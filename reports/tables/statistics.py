@@ -20,7 +20,7 @@ CONFIDENCE = 0.95
 
 
 class Pair(NamedTuple):
-    """Two methods on the models on which both ended well.
+    """Two methods on the models on which both gave a map.
 
     Attributes:
         models: how many.
@@ -106,10 +106,10 @@ def paired_tests(contents: Contents) -> Table | None:
         name="paired",
         title="Two methods at a time",
         caption=(
-            "Every two methods on the models on which both ended well (means over seeds): median "
-            "difference, on how many models the first is lower, and the p-value of Wilcoxon's "
-            f"signed-rank test, two-sided, corrected for the {len(pairs)} pairs (Holm). Failures "
-            "do not enter: read it with the table of successes."
+            "Every two methods on the models on which both gave a map, by means over seeds: the "
+            "median difference, how often the first is lower, and the two-sided p-value of "
+            f"Wilcoxon's signed-rank test, corrected for the {len(pairs)} pairs (Holm). Failures "
+            "do not count here; the table of successes has them."
         ),
         columns=tuple(columns),
         blocks=(tuple(rows),),
@@ -192,7 +192,7 @@ def seed_variance(contents: Contents) -> Table | None:
         title="What the seed changes",
         caption=(
             "Over the seeds of each cell: mean, half of the 95 % confidence interval of the mean "
-            "(Student's t over the seeds that ended well), lowest and highest value. A method with "
+            "(Student's t over the seeds that gave a map), lowest and highest value. A method with "
             "one map for all seeds is deterministic there."
         ),
         columns=tuple(columns),

@@ -196,11 +196,11 @@ def supplement(contents: Contents) -> Table | None:
         name="supplement",
         title="Angle and area distortion, model by model",
         caption=(
-            "Per model: the paper's conformality over all faces, as published, and without the "
-            "faces that span a learned seam; the same for the area discrepancy (0 for an "
-            "equal-area map, at most 2); flipped and seam-spanning faces; charts; length of the "
-            "seams over the root of "
-            "the surface's area; time; runs that ended well of those tried."
+            "Each model's maps. The angle difference is the paper's conformality: over all faces, "
+            "as it was published, and without the faces that span a learned seam. So is the area "
+            "discrepancy, which is 0 for an equal-area map and at most 2. The length of the seams "
+            "is given over the square root of the surface's area. The last column counts the runs "
+            "that gave a map, of those that were tried."
         ),
         columns=tuple(columns),
         blocks=tuple(blocks),
@@ -262,10 +262,10 @@ def comparison(contents: Contents, names: Sequence[str] = ()) -> Table:
         name="comparison",
         title="All methods over all models",
         caption=(
-            "Each metric over the models: mean, median and worst over those on which the method "
-            "ended well (their count beside it, of those tried), and the mean over the models on "
-            f"which all methods did ({shown}). The arrow at a metric points to its better side. "
-            f"A method with more than {MOST_LEFT_OUT:.0%} of its maps not rankable is not ranked."
+            "Mean, median and worst value of each metric over the models on which the method gave "
+            "a map, and their number; then the mean over the models on which every method gave one "
+            f"({shown}). The arrow beside a metric points to its better side. A method is not "
+            f"ranked where more than {MOST_LEFT_OUT:.0%} of its maps may not be."
         ),
         columns=(
             Column("metric", "Metric", text=True, once=True),
@@ -332,7 +332,7 @@ def against_published(contents: Contents) -> Table | None:
 
 
 def failures(contents: Contents) -> Table | None:
-    """Every cell that did not end well, with its reason; None where all did."""
+    """Every cell that gave no map, with its reason; None where all gave one."""
     rows = [
         {
             "case": row.case,
@@ -349,8 +349,8 @@ def failures(contents: Contents) -> Table | None:
         return None
     return Table(
         name="failures",
-        title="Cells that did not end well",
-        caption="Skipped: the method says beforehand that it cannot take the surface.",
+        title="Cells without a map",
+        caption="A method skips a surface that it knows beforehand that it cannot take.",
         columns=(
             Column("case", "Model", text=True),
             Column("method", "Method", text=True),
@@ -394,7 +394,7 @@ def everything(contents: Contents) -> Table:
 
 
 def tables(contents: Contents) -> list[Table]:
-    """The tables of a suite, the one to read first first."""
+    """The tables of a suite, in the order in which to read them."""
     made = [
         ablation(contents),
         success(contents),

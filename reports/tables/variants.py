@@ -29,8 +29,8 @@ def ablation(contents: Contents) -> Table | None:
         name="ablation",
         title=f"Ablation of {contents.methods[0].name}",
         caption=(
-            "One change at a time: each variant on each model, over all faces, means over the "
-            "seeds that ended well. Low distortion with many overlapped or flipped faces is no map."
+            "Each variant makes one change. Values are over all faces, means over the seeds that "
+            "gave a map. A low distortion is worth nothing where many faces overlap or are flipped."
         ),
         columns=(
             Column("case", "Model", text=True, once=True),
@@ -44,7 +44,7 @@ def ablation(contents: Contents) -> Table | None:
 
 
 def _block(contents: Contents, case: str, names: Sequence[str]) -> tuple[Mapping[str, Value], ...]:
-    """The rows of a model, one a method: `names` and how many seeds ended well."""
+    """A row for each method on a model: the metrics `names`, and how many seeds gave a map."""
     rows = []
     for label in contents.methods:
         record = contents.records.get((case, label.short))

@@ -78,7 +78,7 @@
     ]);
     const word = { mean: "Mean", median: "Median", worst: "Worst" }[form.statistic.value];
     said.textContent = over === "own" ? `${word} over each method's own models: not the same ones for all.`
-      : `${word} over the ${suite().common} of ${suite().models.length} models on which all methods ended well, as far as the metric is defined there.`;
+      : `${word} over the ${suite().common} of ${suite().models.length} models on which all methods gave a map and the metric is defined.`;
     return { heads: [{ text: "Method", words: true }, { text: "ok" }, { text: "not ok", words: true }, ...metrics().map(heading)], rows };
   }
 

@@ -138,7 +138,7 @@ def test_other_ends_and_lone_cells_are_listed_with_the_reason(tmp_path):
         ("SLIM", "before"),
         ("Tutte", "after"),
     }
-    assert "1 ended otherwise" in said(found)
+    assert "another status in 1;" in said(found)
 
 
 def test_a_value_that_becomes_infinite_has_moved(tmp_path):
