@@ -97,6 +97,28 @@ def regress(session: nox.Session) -> None:
 
 
 @nox.session
+def endure(session: nox.Session) -> None:
+    """Kill runs, let cells and rows go wrong, run commands among a user's files; print counts.
+
+    15 minutes; `nox -s endure -- --minutes 60 --seed 7`.
+    """
+    install(session)
+    arguments = session.posargs or ["--minutes", "15"]
+    session.run("python", "-m", "benchmarks.checks.endurance", "all", *arguments)
+
+
+@nox.session
+def fuzz(session: nox.Session) -> None:
+    """Feed readers, saved models and results folders with changed files; print counts.
+
+    15 minutes; `nox -s fuzz -- --minutes 60 --seed 7`.
+    """
+    install(session)
+    arguments = session.posargs or ["--minutes", "15"]
+    session.run("python", "-m", "benchmarks.checks.fuzzing", "all", *arguments)
+
+
+@nox.session
 def mutants(session: nox.Session) -> None:
     """Try small wrong changes and count those noticed: `nox -s mutants -- --samples 60 --seed 0`.
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from benchmarks.running.scratch import MARK
+from parapoint.errors import InputError
 from reports.contents import contents
 from reports.page import pages as page
 from reports.page.sections import Section
@@ -23,11 +25,14 @@ def write(folder: Path, *, jobs: int, textured: bool = False) -> Path:
     not changed is not drawn again.
 
     Raises:
-        InputError: the folder is missing, holds no results, or is of a newer version.
+        InputError: the folder is missing, holds no results, or is of a newer version; something
+            that no report has written is in the way.
     """
     report = folder / "report"
     sections = []
-    for suite in contents(folder):
+    suites = contents(folder)
+    _claim(report)
+    for suite in suites:
         made = tables.tables(suite)
         name = slug(suite.suite)
         formats.write([*made, tables.everything(suite)], report / "tables" / name)
@@ -38,3 +43,17 @@ def write(folder: Path, *, jobs: int, textured: bool = False) -> Path:
             faults += exports.write(suite, report)
         sections.append(Section(report, suite, made, drawn, faults))
     return page.write(report, folder, sections)
+
+
+def _claim(report: Path) -> None:
+    """Make the folder of a report, marked as ours.
+
+    Raises:
+        InputError: there is something that is not ours.
+    """
+    mark = report / MARK
+    is_free = not report.exists() or (report.is_dir() and not any(report.iterdir()))
+    if report.is_symlink() or not (is_free or mark.is_file()):
+        raise InputError(f"{report}: is in the way and not known to be ours; move it")
+    report.mkdir(parents=True, exist_ok=True)
+    mark.touch()

@@ -34,6 +34,7 @@ import psutil
 from baselines import registry
 from benchmarks.cases.suites import Suite
 from benchmarks.checks import faulty, instant
+from benchmarks.checks.bystanders import undisturbed
 from benchmarks.running import planning, runner
 from benchmarks.store import measuring, verifying
 from benchmarks.store.results import Store
@@ -185,7 +186,7 @@ def saved(models: Path, out: Path, seeds: int) -> Toll:
     runner.run(instants, out / "alone", plugins=[PLUGIN])
     plugins = [PLUGIN, f"{faulty.__file__}:Faulty"]
     # One at a time: some do away with the folders of all cells that are at work.
-    runner.run(mixed, out / "mixed", plugins=plugins, timeout=4.0, memory=0.5)
+    runner.run(mixed, out / "mixed", plugins=plugins, timeout=8.0, memory=0.5)
     store = Store(out / "mixed")
     for fault in verifying.faults(store):
         found.fault(fault)
@@ -228,6 +229,36 @@ def kills(ctx: click.Context, count: int, seed: int) -> None:
         f"reported, {found.tables} runs came to their end: {found.faults or 'no'} faults"
     )
     if found.faults:
+        ctx.exit(1)
+
+
+@main.command("all")
+@click.option("--minutes", type=click.FloatRange(0, min_open=True), default=15, show_default=True)
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.pass_context
+def all_(ctx: click.Context, minutes: float, seed: int) -> None:
+    """All of it in turn, until the time is over: kills, faults, commands among a user's files."""
+    end = time.monotonic() + 60 * minutes
+    rounds = total = 0
+    while time.monotonic() < end:
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            suite = instant_suite(folder / "models", models=4, methods=2, seeds=4)
+            killed = toll(suite, folder, count=20, seed=seed + rounds)
+            wrong = saved(folder / "faulty", folder / "wrong", 1)
+            found = undisturbed(folder / "bystanders", count=10, seed=seed + rounds)
+        for fault in found.faults:
+            print(fault)
+        rounds += 1
+        total += killed.faults + wrong.faults + len(found.faults)
+        print(
+            f"round {rounds}: {killed.kills} kills after {killed.reported} rows, "
+            f"{wrong.reported} cells of which {2 * len(faulty.FAULTS)} went wrong, "
+            f"{found.runs} commands ({found.refused} refused) among {found.files} files; "
+            f"faults so far: {total}",
+            flush=True,
+        )
+    if total:
         ctx.exit(1)
 
 

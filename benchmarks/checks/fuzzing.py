@@ -12,6 +12,7 @@ import contextlib
 import functools
 import io
 import logging
+import random
 import resource
 import struct
 import sys
@@ -97,12 +98,47 @@ def store(data: bytes) -> None:
             (folder / "runs.torn").unlink(missing_ok=True)
 
 
+def model(data: bytes) -> None:
+    """Load a saved model one file of which is `data` but for its first byte."""
+    from parapoint.estimator import load
+
+    files = sorted(_model().iterdir())
+    path = files[(data[0] if data else 0) % len(files)]
+    before = path.read_bytes()
+    path.write_bytes(data[1:])
+    try:
+        with contextlib.suppress(InputError):
+            load(_model())
+    finally:
+        path.write_bytes(before)
+
+
+@functools.cache
+def _model() -> Path:
+    """The folder of a small model."""
+    from parapoint import ComputedMap
+
+    points = np.random.default_rng(0).normal(size=(150, 3))
+    ComputedMap(points=120).fit(points / np.linalg.norm(points, axis=1, keepdims=True)).save(
+        _scratch() / "model"
+    )
+    return _scratch() / "model"
+
+
 TARGETS: dict[str, Callable[[bytes], None]] = {
     **{ending[1:]: functools.partial(read_as, ending) for ending in FORMATS},
     "score": score,
     "store": store,
+    "model": model,
 }
-"""What takes bytes, by name: a reader for each ending, `score` and the results folder."""
+"""What takes bytes, by name: a reader for each ending, `score`, a results folder, a saved model."""
+HOSTILE = (
+    *(b"", b"-1", b"0", b"1e999", b"nan", b"999999999999", b"\xff" * 4, b"\x7f" * 8, b"\n" * 3),
+    *(struct.pack("<I", 2**31), struct.pack("<Q", 10**12), b"../../etc/passwd"),
+)
+"""What is put into files."""
+LARGE = 1_000_000
+"""Bytes of the files that grow by repetition."""
 
 
 def guarded(target: Callable[[bytes], None], data: bytes) -> None:
@@ -177,6 +213,9 @@ def _functions(*packages: str) -> Iterator[types.FunctionType]:
 
 def seeds(target: str) -> list[bytes]:
     """Small inputs that are right, from which the fuzzer starts."""
+    if target == "model":
+        files = sorted(_model().iterdir())
+        return [bytes([n]) + path.read_bytes() for n, path in enumerate(files)]
     if target == "store":
         folder, row_id, surface_hash = _results()
         names = [*TABLES, f"uv/{row_id}.npz", f"surfaces/{surface_hash}.npz"]
@@ -243,8 +282,49 @@ def _exported(mesh: Any, kind: str) -> bytes:
     return content.encode() if isinstance(content, str) else bytes(content)
 
 
+def changed(data: bytes, draw: random.Random) -> bytes:
+    """`data` with bytes at up to four places replaced, or cut, or grown to a million bytes."""
+    for _ in range(draw.randrange(1, 5)):
+        at = draw.randrange(len(data) + 1)
+        piece = draw.choice([*HOSTILE, draw.randbytes(draw.randrange(1, 9))])
+        data = data[:at] + piece + data[at + draw.randrange(9) :]
+    if data and draw.random() < 0.02:
+        low, high = sorted(draw.randrange(len(data) + 1) for _ in range(2))
+        piece = data[low:high] or b"0 "
+        data = data[:high] + piece * (LARGE // len(piece)) + data[high:]
+    return data
+
+
+def unguided(minutes: float, seed: int) -> int:
+    """Feed all targets in turn with changed seeds until the time is over; how many findings."""
+    draw = random.Random(seed)  # noqa: S311  no secret
+    given = {name: seeds(name) for name in TARGETS}
+    _first_megabytes()
+    counts, slowest = dict.fromkeys(TARGETS, 0), dict.fromkeys(TARGETS, 0.0)
+    findings = 0
+    end = time.monotonic() + 60 * minutes
+    while time.monotonic() < end:
+        for name, target in TARGETS.items():
+            data = changed(draw.choice(given[name]), draw)
+            began = time.process_time()
+            try:
+                guarded(target, data)
+            except Exception as error:  # noqa: BLE001  whatever it is, it is a finding
+                findings += 1
+                kept = Path(tempfile.mkdtemp()) / f"finding.{name}"
+                kept.write_bytes(data)
+                print(f"{name}: {type(error).__name__}: {error} ({kept})", flush=True)
+            counts[name] += 1
+            slowest[name] = max(slowest[name], time.process_time() - began)
+    for name, count in counts.items():
+        print(f"{name:6} {count:8} inputs, at most {slowest[name]:.2f} s")
+    grown = _peak_megabytes() - _first_megabytes()
+    print(f"{sum(counts.values())} inputs, {findings} findings, {grown:.0f} MB more at the peak")
+    return findings
+
+
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
-@click.argument("target", type=click.Choice(list(TARGETS)))
+@click.argument("target", type=click.Choice(["all", *TARGETS]))
 @click.option("--runs", type=click.IntRange(1), default=100_000, show_default=True)
 @click.option("--seconds", type=click.IntRange(1), help="End after so long.  [default: never]")
 @click.option("--seed", type=click.IntRange(1), default=1, show_default=True)
@@ -255,8 +335,27 @@ def _exported(mesh: Any, kind: str) -> bytes:
     show_default=True,
     help="Keeps what inputs were worth keeping, and findings.",
 )
-def main(target: str, *, runs: int, seconds: int | None, seed: int, out: Path) -> None:
-    """Feed a TARGET with RUNS inputs; ends with an error at the first finding."""
+@click.option("--minutes", type=click.FloatRange(0, min_open=True), default=15, show_default=True)
+@click.pass_context
+def main(
+    ctx: click.Context,
+    target: str,
+    *,
+    runs: int,
+    seconds: int | None,
+    seed: int,
+    out: Path,
+    minutes: float,
+) -> None:
+    """Feed a TARGET with RUNS inputs; ends with an error at the first finding.
+
+    With `all`, feed each for its part of MINUTES with inputs that nothing guides, and count.
+    """
+    if target == "all":
+        logging.disable(logging.CRITICAL)
+        if unguided(minutes, seed):
+            ctx.exit(1)
+        return
     try:
         import atheris
     except ImportError:

@@ -39,6 +39,22 @@ def environment(folder: Path) -> dict[str, Any]:
     return content
 
 
+def begin(folder: Path) -> None:
+    """Write `environment.json` without a run unless it is there: the folder is known as ours by it.
+
+    Raises:
+        InputError: the disk is full.
+    """
+    if not (folder / "environment.json").exists():
+        _write(folder, {"format": FORMAT, "runs": []})
+
+
+def _write(folder: Path, content: Mapping[str, Any]) -> None:
+    path = folder / "environment.json"
+    with disk_said(path), replacing(path) as stream:
+        stream.write(json.dumps(content, indent=1).encode() + b"\n")
+
+
 def add_run(folder: Path, entry: Mapping[str, object]) -> int:
     """Add the entry of a run to `environment.json`; its number.
 
@@ -47,7 +63,5 @@ def add_run(folder: Path, entry: Mapping[str, object]) -> int:
     """
     content = environment(folder)
     content["runs"].append(plain(entry))
-    path = folder / "environment.json"
-    with disk_said(path), replacing(path) as stream:
-        stream.write(json.dumps(content, indent=1).encode() + b"\n")
+    _write(folder, content)
     return len(content["runs"]) - 1

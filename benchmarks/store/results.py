@@ -27,6 +27,12 @@ from benchmarks.store.files import Files
 from benchmarks.store.rows import ResultRow, RowFile
 from parapoint.errors import InputError
 
+NAMES = (
+    *("lock", "runs.jsonl", "runs.torn", "surfaces.json", "metrics.parquet"),
+    *("uv", "surfaces", "references", "exact"),
+)
+"""What a run may make in a results folder, once `environment.json` is there."""
+
 
 class Store(Files):
     """The results in a folder. Anybody may read them; they are written inside `writing()`."""
@@ -86,11 +92,13 @@ class Store(Files):
         The lock is the system's own on an open file: it ends with its process, however that ends.
 
         Raises:
-            InputError: another run holds the folder, or the disk is full.
+            InputError: another run holds the folder, the disk is full, or something in the folder
+                has the name of a file of ours and no run has written it.
         """
         import filelock
 
         with disk_said(self.folder):
+            self._check_ours()
             self.folder.mkdir(parents=True, exist_ok=True)
             lock = filelock.FileLock(self.folder / "lock", timeout=0)
             try:
@@ -100,7 +108,26 @@ class Store(Files):
                     f"{self.folder} is in use by another run; wait for it, or name another folder"
                 ) from None
         try:
+            provenance.begin(self.folder)
             with self.row_file.appending():
                 yield
         finally:
             lock.release()
+
+    def _check_ours(self) -> None:
+        """Check that a folder without our record holds nothing that we would add to or replace.
+
+        Raises:
+            InputError: it does.
+        """
+        if (self.folder / "environment.json").exists():
+            return
+        for name in NAMES:
+            path = self.folder / name
+            # A run that was killed at its very beginning leaves an empty lock.
+            if path.is_symlink() or (path.exists() and not (name == "lock" and _is_empty(path))):
+                raise InputError(f"{path}: is in the way and not ours; take another --out")
+
+
+def _is_empty(path: Path) -> bool:
+    return path.is_file() and path.stat().st_size == 0

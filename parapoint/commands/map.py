@@ -29,4 +29,9 @@ def map_(model: str, surface: str, out: str, device: str, *, force: bool, as_jso
     from parapoint.estimator import load
 
     facts = write(load(model, device=device), read_surface(surface), out)
-    print(json.dumps(facts) if as_json else f"{out}: {facts['mapped_points']} points mapped")
+    if as_json:
+        print(json.dumps(facts))
+        return
+    print(f"{out}: {facts['mapped_points']} points mapped")
+    if count := facts.get("unmapped_points"):
+        print(f"{count} points lie far from the surface: rows {facts['unmapped_rows']} come first")

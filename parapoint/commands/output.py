@@ -15,7 +15,7 @@ from parapoint.files.targets import beside, checked_picture, checked_target
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.sampling import mean_spacing
 from parapoint.surfaces.spanning import Transform, opened, spanning_edges
-from parapoint.surfaces.strays import far_from, named, unmapped
+from parapoint.surfaces.strays import NAMED, far_from, named, unmapped
 from parapoint.surfaces.surface import BoolArray, Mesh, Surface
 from parapoint.textures.baking import MARGIN, baked
 from parapoint.textures.checkerboard import checkerboard
@@ -107,10 +107,9 @@ def write(
             write_textured(out, shown, pixels)
     elif ending == ".npz" or (ending in {".ply", ".obj"} and texture is None):
         uv = unmapped(surface, _then(model.transform, placing)(points))
-        is_far = np.isnan(uv[:, 0])
-        if is_far.sum() > model.report_.get("strays", 0):  # of those of the fit the user has heard
-            _warn_of_far(out, is_far)
-        facts |= {"mapped_points": int((~is_far).sum()), "unmapped_points": int(is_far.sum())}
+        nowhere = np.flatnonzero(np.isnan(uv[:, 0]))
+        facts |= {"mapped_points": len(uv) - len(nowhere), "unmapped_points": len(nowhere)}
+        facts["unmapped_rows"] = nowhere[:NAMED].tolist()
         write_points(out, surface, uv)
     else:
         facts |= {"faces": len(charted.mesh.faces), "texture": size}

@@ -330,12 +330,13 @@ def _filled(points: FloatArray, faces: IntArray, loops: list[IntArray]) -> IntAr
             length = np.linalg.norm(points[after] - points[before], axis=1)
             ends = np.sort(np.stack([before, after], axis=1), axis=1).tolist()
             length[[tuple(pair) in present for pair in ends]] = np.inf
+            length[~_has_area(points, np.stack([before, loop, after], axis=1))] = np.inf
             ear = int(length.argmin())
             if not np.isfinite(length[ear]):
                 break
             present.add(tuple(ends[ear]))
             ears.append([int(before[ear]), loop.pop(ear), int(after[ear])])
-        if len(loop) == 3:
+        if len(loop) == 3 and _has_area(points, np.array([loop]))[0]:
             ears.append(loop)
     return np.concatenate([faces, np.array(ears, dtype=np.int64).reshape(-1, 3)])
 

@@ -10,10 +10,8 @@ import hashlib
 import itertools
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Mapping, Sequence
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 
 from benchmarks.rendering.maps import FIELDS, SAMPLES
@@ -26,6 +24,7 @@ from reports.contents import Contents
 from reports.pictures import clouds
 from reports.pictures.names import ARTIST_PICTURES, map_file, map_kinds, model_file, model_kinds
 from reports.pictures.portraits import Portrait, save
+from reports.pictures.workers import done_by_several
 
 SIZE, SMALL = 360, 280
 """Longer side of a picture in pixels: what the largest figure of a model prints, and enough for the
@@ -72,7 +71,8 @@ def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
     faults: list[str] = []
     wanting = itertools.chain.from_iterable(missing for _, missing in work)
     done = {name: keys[name] for name in keys.keys() - set(wanting)}
-    made = _results(contents.store, work, folder, with_heat, jobs)
+    make = partial(draw_model, contents.store.folder, folder, with_heat)
+    made = done_by_several(make, work, jobs)
     for (_, missing), (failed, said) in zip(work, made, strict=True):
         faults += said
         done |= {name: keys[name] for name in set(missing).difference(failed)}
@@ -105,24 +105,6 @@ def known_keys(record: Path) -> dict[str, str]:
     if not isinstance(content, dict):
         return {}
     return {name: key for name, key in content.items() if PLAIN_NAME.fullmatch(name)}
-
-
-def _results(
-    store: Store,
-    work: list[tuple[list[ResultRow], list[str]]],
-    folder: Path,
-    with_heat: bool,
-    jobs: int,
-) -> Iterator[tuple[list[str], list[str]]]:
-    make = partial(draw_model, store.folder, folder, with_heat)
-    if jobs <= 1 or len(work) <= 1:
-        for todo in work:
-            yield make(*todo)
-        return
-    with ProcessPoolExecutor(min(jobs, len(work)), mp_context=get_context("spawn")) as pool:
-        pending = [pool.submit(make, *todo) for todo in work]
-        for done in pending:
-            yield done.result()
 
 
 def draw_model(

@@ -10,10 +10,8 @@ import hashlib
 import io
 import json
 from collections.abc import Callable, Container, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from typing import IO, Any
 
@@ -53,6 +51,7 @@ from reports.pictures.plots import (
     singular_values,
 )
 from reports.pictures.style import DARK_PAPER, STYLE, darken
+from reports.pictures.workers import done_by_several
 from reports.tables.published import published_values
 
 
@@ -338,12 +337,7 @@ def draw(contents: Contents, pictures: Path, folder: Path, jobs: int) -> list[Dr
         if known.get(drawing.name) != keys[drawing.name]:
             changed.append(drawing)
     make = partial(write, folder, contents.is_large)
-    if jobs > 1 and len(changed) > 1:
-        with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-            list(pool.map(make, changed))
-    else:
-        for drawing in changed:
-            make(drawing)
+    list(done_by_several(make, [(drawing,) for drawing in changed], jobs))
     record.write_text(json.dumps(keys, indent=0, sort_keys=True) + "\n")
     for name in known.keys() - keys.keys():  # of a folder that grew
         for ending in ENDINGS:

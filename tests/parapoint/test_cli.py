@@ -57,6 +57,19 @@ def test_fit_then_map_a_cloud(cloud, tmp_path, capsys) -> None:
     assert -0.5 < uv.min() <= uv.max() < 1.5
 
 
+def test_strays_of_other_points_are_named_and_mapped_nowhere(cloud, tmp_path, capsys) -> None:
+    """Two of three points, of which one alone would be the whole cloud."""
+    model, others, target = tmp_path / "model", tmp_path / "others.xyz", tmp_path / "map.ply"
+    assert run(["fit", str(cloud), "--out", str(model)], capsys)[0] == 0
+    others.write_text("900 0 0\n0 0 1\n0 -1e9 0\n")
+    status, out, err = run(["map", str(model), str(others), "--out", str(target)], capsys)
+    assert (status, err) == (0, "")
+    assert "1 points mapped" in out
+    assert "2 points lie far from the surface: rows [0, 2] come first" in out
+    _, uv = files.read_point_map(target)
+    assert np.isnan(uv.uv).all(axis=1).tolist() == [True, False, True]
+
+
 def test_unwrap_a_mesh_with_a_checkerboard(disk, tmp_path, capsys) -> None:
     target = tmp_path / "out.obj"
     status, out, err = run(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
-from benchmarks.checks import endurance, faulty
+from benchmarks.checks import bystanders, endurance, faulty
 from benchmarks.running.environment import ROOT
 from benchmarks.store.results import Store
 from benchmarks.store.rows import ResultRow, identity
@@ -13,7 +13,7 @@ from benchmarks.store.rows import ResultRow, identity
 KILLS = """
 import sys
 from pathlib import Path
-from benchmarks.checks import endurance, faulty
+from benchmarks.checks import bystanders, endurance, faulty
 folder = Path(sys.argv[1])
 suite = endurance.instant_suite(folder / "models", models=2, methods=1, seeds=2)
 print(endurance.toll(suite, folder, count=2, seed=1))
@@ -61,3 +61,29 @@ def test_methods_that_go_wrong_cost_their_own_cells(tmp_path, monkeypatch, capsy
     monkeypatch.setattr(faulty, "FAULTS", {"quit": (lambda: None, "timeout")})
     assert endurance.saved(tmp_path / "models", tmp_path / "two", 1).faults == 2
     assert "in place of timeout" in capsys.readouterr().out
+
+
+def test_commands_leave_the_files_of_the_user(tmp_path):
+    found = bystanders.undisturbed(tmp_path / "folder", count=4, seed=3)
+    assert found.faults == []
+    assert found.runs == 4
+    assert found.files > 50
+
+
+def test_a_file_that_changes_is_found(tmp_path, monkeypatch):
+    wrong = "import pathlib, sys; pathlib.Path(sys.argv[1], 'mine', 'lock').write_text('ours')"
+    monkeypatch.setattr(bystanders, "NAMES", ("lock", "a", "b", "c"))
+    monkeypatch.setattr(bystanders, "COMMANDS", ("parapoint",))
+
+    def status(_, folder):
+        if (folder / "mine" / "lock").exists():
+            return subprocess.call([sys.executable, "-c", wrong, str(folder)])
+        return 0
+
+    monkeypatch.setattr(
+        bystanders, "_inputs", lambda at: (at / "results").mkdir(parents=True) or {}
+    )
+    monkeypatch.setattr(bystanders, "_status", status)
+    found = bystanders.undisturbed(tmp_path / "folder", count=6, seed=0)
+    assert found.faults
+    assert all("lock was changed" in fault for fault in found.faults)

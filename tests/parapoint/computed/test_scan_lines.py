@@ -77,6 +77,14 @@ def test_lines_show_the_surface(
     assert np.median(ratio) < 1 + distortion
 
 
+def test_lines_on_a_grid_are_mapped() -> None:
+    """Whole millimetres leave many points on one line, which span no triangle."""
+    cloud = np.unique(np.round(terrain(12)), axis=0)
+    flat = flat_map(Frame.of(cloud).inside(cloud))
+    assert len(flat.anchors) > 0.95 * len(cloud)
+    assert (flat.charted.mesh.face_areas > 0).all()
+
+
 def test_lines_farther_apart_are_refused_with_advice() -> None:
     """No surface can be told from lines that nobody sees side by side."""
     with pytest.raises(InputError, match="keep every tenth point of each line"):

@@ -1,0 +1,49 @@
+"""Processes that share the drawing, and end with the report, however that ends."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from typing import TypeVar
+
+from benchmarks.running.limits import end_with
+
+Result = TypeVar("Result")
+_log = logging.getLogger("parapoint")
+
+
+def done_by_several(
+    make: Callable[..., Result], work: Sequence[tuple[object, ...]], jobs: int
+) -> Iterator[Result]:
+    """What `make` returns for the arguments of each piece of work, in order.
+
+    Args:
+        make: a function that other processes can import, or a partial one.
+        work: the arguments of each call.
+        jobs: how many processes share the work. Where the system has no room for what they would
+            share, as with a full /dev/shm, this process does it alone.
+    """
+    pool = _pool(min(jobs, len(work)))
+    if pool is None:
+        for arguments in work:
+            yield make(*arguments)
+        return
+    with pool:
+        for pending in [pool.submit(make, *arguments) for arguments in work]:
+            yield pending.result()
+
+
+def _pool(jobs: int) -> ProcessPoolExecutor | None:
+    """Processes for so many jobs; None for one, or if there can be none."""
+    if jobs <= 1:
+        return None
+    try:
+        return ProcessPoolExecutor(
+            jobs, mp_context=get_context("spawn"), initializer=end_with, initargs=(os.getpid(),)
+        )
+    except OSError as error:
+        _log.warning("one process draws alone: %s", error.strerror)
+        return None
