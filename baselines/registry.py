@@ -75,7 +75,7 @@ class Description:
         requires: what a surface must be, words of `parapoint.method.REQUIREMENTS`, sorted.
         parameters: its fields and their defaults, as source text; "" for none.
         deterministic: whether it promises the same map for the same seed: "yes", "no", or "by its
-            parameters".
+            parameters"; ", with as many threads" where it depends on their number.
     """
 
     summary: str
@@ -177,9 +177,10 @@ def describe(name: str) -> Description:
             parameters[field.name] = "" if default is MISSING else repr(default)
     summary = (kind.__doc__ or "").strip().split("\n", maxsplit=1)[0]
     promise = {True: "yes", False: "no"}.get(getattr(kind, "deterministic", True))
-    return Description(
-        summary, tuple(sorted(kind.requires)), parameters, promise or "by its parameters"
-    )
+    promise = promise or "by its parameters"
+    if promise != "no" and _imported_by(kind.__module__, "torch"):
+        promise += ", with as many threads"
+    return Description(summary, tuple(sorted(kind.requires)), parameters, promise)
 
 
 def source_hash(made: Method) -> str:
@@ -195,9 +196,22 @@ def source_hash(made: Method) -> str:
     return sources.source_hash(*modules, packages=getattr(made, "packages", ()))
 
 
+def depends_on_threads(made: Method) -> bool:
+    """Whether the map of a method depends on how many threads it may use.
+
+    So it is with all that torch computes: it parts sums among its threads, and rounding differs
+    with the parts.
+    """
+    return imports(made, "torch")
+
+
 def imports(made: Method, package: str) -> bool:
     """Whether a method's module imports a package, itself or through modules of this project."""
-    module = type(made).__module__
+    return _imported_by(type(made).__module__, package)
+
+
+def _imported_by(module: str, package: str) -> bool:
+    """As `imports`, for a module by its name."""
     own = {"parapoint", "baselines", module.partition(".")[0]}
     pending, seen = [module], set[str]()
     while pending:

@@ -186,7 +186,7 @@ def saved(models: Path, out: Path, seeds: int) -> Toll:
     runner.run(instants, out / "alone", plugins=[PLUGIN])
     plugins = [PLUGIN, f"{faulty.__file__}:Faulty"]
     # One at a time: some do away with the folders of all cells that are at work.
-    runner.run(mixed, out / "mixed", plugins=plugins, timeout=4.0, memory=0.5)
+    runner.run(mixed, out / "mixed", plugins=plugins, timeout=8.0, memory=0.5)
     store = Store(out / "mixed")
     for fault in verifying.faults(store):
         found.fault(fault)

@@ -54,6 +54,7 @@ class Chosen:
         params: all its parameters.
         source_hash: hash of its source.
         modules: those of SLOW that it imports.
+        counts_threads: whether its map depends on the number of threads.
     """
 
     spec: str
@@ -61,6 +62,7 @@ class Chosen:
     params: Mapping[str, object]
     source_hash: str
     modules: tuple[str, ...]
+    counts_threads: bool = False
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,8 @@ def choice(
     for spec, name, method in made:
         params = plain(dataclasses.asdict(cast("Any", method)))
         modules = tuple(module for module in SLOW if registry.imports(method, module))
-        chosen.append(Chosen(spec, name, params, registry.source_hash(method), modules))
+        counts = registry.depends_on_threads(method)
+        chosen.append(Chosen(spec, name, params, registry.source_hash(method), modules, counts))
     asked = suite.cases if cases is None else cases
     names = tuple(dict.fromkeys(models.canonical_name(case) for case in asked))
     asked_seeds = suite.seeds if seeds is None else tuple(dict.fromkeys(seeds))
@@ -211,7 +214,7 @@ def plan(
     rows = {row.cell: row for row in store.rows()}
     runs = store.environment()["runs"]
     planned, kept = [], []
-    for method, blank in _blanks(suite, chosen, hashes):
+    for method, blank in _blanks(suite, chosen, hashes, here["threads"]):
         row = rows.get(blank.cell)
         why = "new" if row is None else changed(blank, row, store, runs, here)
         if why:
@@ -222,13 +225,14 @@ def plan(
 
 
 def _blanks(
-    suite: Suite, chosen: Sequence[Chosen], hashes: Mapping[str, str]
+    suite: Suite, chosen: Sequence[Chosen], hashes: Mapping[str, str], threads: int
 ) -> Iterator[tuple[Chosen, ResultRow]]:
     """Each cell of a suite once: its method, and its row with the identity alone."""
     seen = set()
     for case in suite.cases:
         for method in chosen:
             for seed in suite.seeds:
+                counted = threads if method.counts_threads else None
                 row_id = identity(
                     suite=suite.name,
                     case=case,
@@ -237,6 +241,7 @@ def _blanks(
                     seed=seed,
                     source_hash=method.source_hash,
                     surface_hash=hashes[case],
+                    threads=counted,
                 )
                 if row_id in seen:
                     continue
@@ -253,6 +258,7 @@ def _blanks(
                         source_hash=method.source_hash,
                         surface_hash=hashes[case],
                         status="skipped",
+                        threads=counted,
                     ),
                 )
 
@@ -279,6 +285,10 @@ def changed(
         return "method changed"
     if row.surface_hash != cell.surface_hash:
         return "model changed" if row.surface_hash else "model was missing"
+    there = runs[row.run] if 0 <= row.run < len(runs) else {}
+    before = there.get("threads") if row.threads is None else row.threads  # of older rows
+    if cell.threads is not None and before != cell.threads:
+        return "other number of threads"
     if row.reason == SOURCE_CHANGED:
         return "method changed"
     if row.reason == WORKER_LOST:
@@ -289,7 +299,6 @@ def changed(
         return "was killed"
     if row.status == "ok":
         return "" if store.uv_path(row.id).exists() else "map missing"
-    there = runs[row.run] if 0 <= row.run < len(runs) else {}
     if any(there.get(name) != here[name] for name in environment.MACHINE):
         return f"{row.status} in another environment"
     if row.reason.startswith(MISSING):

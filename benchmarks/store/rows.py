@@ -28,7 +28,7 @@ KILLED = ("SIGHUP", "SIGINT", "SIGQUIT", "SIGKILL", "SIGTERM")
 """Signals that come from outside, as a rule: a cell that one of them has ended is tried again."""
 WATCHER_KILLED = "the process that watched over it was killed"
 """Reason of a row whose supervisor ended before the cell; the next run tries again."""
-IDENTITY = ("suite", "case", "method", "params", "seed", "source_hash", "surface_hash")
+IDENTITY = ("suite", "case", "method", "params", "seed", "source_hash", "surface_hash", "threads")
 """The fields of a row that its id is made of."""
 _log = logging.getLogger("parapoint")
 
@@ -38,7 +38,7 @@ class ResultRow:
     """One cell of a run and how it ended; a line of `runs.jsonl`.
 
     Attributes:
-        id: hash of the cell's identity: suite, case, method, params, seed and the two hashes.
+        id: hash of the cell's identity: suite, case, method, params, seed, the two hashes, threads.
         suite: name of the suite.
         case: canonical name of the model, or the path that was given.
         method: registry name of the method, such as "slim".
@@ -61,6 +61,7 @@ class ResultRow:
             hashes.
         report: what the method wrote beside its result, such as energies and iterations.
         run: the entry of `environment()["runs"]` in which the cell ran.
+        threads: how many threads the cell could use, where its map depends on it; None elsewhere.
         host: name and processor of the worker that ran it; "" on the run's own machine.
     """
 
@@ -85,6 +86,7 @@ class ResultRow:
     report: Mapping[str, object] = field(default_factory=dict)
     run: int = 0
     host: str = ""
+    threads: int | None = None
 
     @property
     def cell(self) -> str:
@@ -102,9 +104,11 @@ def identity(
     seed: int,
     source_hash: str,
     surface_hash: str,
+    threads: int | None = None,
 ) -> str:
-    """The id of a cell: 32 hexadecimal digits."""
+    """The id of a cell: 32 hexadecimal digits. `threads` counts where the map depends on it."""
     parts = [suite, case, method, plain(params), seed, source_hash, surface_hash]
+    parts += [] if threads is None else [threads]
     text = json.dumps(parts, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from baselines import registry
 from benchmarks.cases import models
-from benchmarks.running import planning
+from benchmarks.running import environment, planning
 from benchmarks.store.results import Store
+from benchmarks.store.rows import ResultRow, identity
 from parapoint.errors import InputError
 
 
@@ -78,3 +80,30 @@ def test_a_file_that_is_gone_is_bad_input(tmp_path, monkeypatch):
     monkeypatch.setattr(models, "is_made_in_memory", lambda _: False)
     with pytest.raises(InputError, match=r"a\.off"):
         planning._origin(str(path), "readers")
+
+
+def counted(threads: int | None, **given: object) -> ResultRow:
+    fields = {"suite": "trial", "case": "c", "method": "fam", "params": {}, "seed": 0}
+    fields |= {"source_hash": "abc", "surface_hash": "def", "threads": threads}
+    return ResultRow(id=identity(**fields), status="failed", **fields, **given)
+
+
+def test_the_number_of_threads_is_part_of_a_cell_where_its_map_depends_on_it(tmp_path):
+    store, here = Store(tmp_path), dict.fromkeys(environment.MACHINE, "here")
+    runs = [here | {"threads": 2}]
+    again = "other number of threads"
+    assert planning.changed(counted(1), counted(2), store, runs, here) == again
+    assert planning.changed(counted(2), counted(2), store, runs, here) == ""
+    assert planning.changed(counted(1), counted(None), store, runs, here) == again  # an older row
+    assert planning.changed(counted(2), counted(None), store, runs, here) == ""
+    assert planning.changed(counted(None), counted(None), store, runs, here) == ""
+    assert len({counted(threads).id for threads in (None, 1, 2)}) == 3
+
+
+def test_methods_that_torch_computes_count_threads_and_say_so():
+    for name in ("parapoint", "fam", "nuvo"):
+        assert registry.depends_on_threads(registry.method(name)[1])
+        assert registry.describe(name).deterministic.endswith("with as many threads")
+    for name in ("computed", "slim", "tutte"):
+        assert not registry.depends_on_threads(registry.method(name)[1])
+        assert "threads" not in registry.describe(name).deterministic
