@@ -9,7 +9,7 @@ from parapoint.method import UnsupportedError
 from parapoint.parameters import check_number
 from parapoint.planar.descent import Run, sound
 from parapoint.planar.domains import domain
-from parapoint.planar.growth import grown
+from parapoint.planar.growth import PRICE, grown
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh, Surface
 from parapoint.unwrapping.given import unwrapped_along
@@ -25,7 +25,7 @@ class AutomaticSLIM:
         price: as of `parapoint.unwrapping.unwrap.Unwrap`; None for the automatic cut as it is.
     """
 
-    price: float | None = 1.0
+    price: float | None = PRICE
 
     requires: ClassVar[frozenset[str]] = frozenset({"faces", "disk_after_cut"})
     packages: ClassVar[tuple[str, ...]] = ("libigl", "shapely")

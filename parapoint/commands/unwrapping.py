@@ -139,7 +139,8 @@ def lines(facts: dict[str, object]) -> str:
     angles = f"angles off by {of['angle_mean']}° in the mean, {of['angle_worst']}° at worst"
     stretch = f"stretch {of['stretch_mean']} in the mean, {of['stretch_worst']} at worst"
     part = f"smallest part at {of['smallest_part']} of its fair area"
-    seam = f"{of['charts']} charts, seam {of['seam']} of the square root of the area"
+    charts = "1 chart" if of["charts"] == "1" else f"{of['charts']} charts"
+    seam = f"{charts}, seam {of['seam']} of the square root of the area"
     texels = f"{of['texels_per_unit']} texels per unit, {of['filled']} of the square filled"
     return "\n".join(
         [

@@ -17,7 +17,7 @@ import numpy as np
 
 from parapoint.planar.bijection import is_bijective
 from parapoint.planar.descent import Run
-from parapoint.planar.growth import grown
+from parapoint.planar.growth import PRICE, grown
 from parapoint.planar.scaffold import LEAST_GAIN, excess, of_area_one, steps_down
 from parapoint.surfaces.areas import signed_areas, starved_share
 from parapoint.surfaces.surface import FloatArray, Mesh
@@ -29,8 +29,6 @@ every part keeps its area; "isometric" angles and areas alike."""
 
 MOST_STARVED = 0.01
 """Share of the surface that may be starved of area, so that no part of 1 % can be."""
-PRICE = 0.4
-"""What the symmetric Dirichlet energy (4 at least) must fall by for each sqrt(area) of seam."""
 HALVINGS = 5
 """A step that would starve a part is shortened to within 2 to the power of minus this."""
 

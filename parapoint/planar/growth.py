@@ -10,6 +10,9 @@ from parapoint.surfaces.areas import MOST_STARVED, starved_faces, starved_share
 from parapoint.surfaces.cutting import edge_graph, edge_lengths, path_to
 from parapoint.surfaces.surface import BoolArray, FloatArray
 
+PRICE = 1.0
+"""What the symmetric Dirichlet energy (4 at least) must fall by for each sqrt(area) of seam, unless
+told otherwise."""
 TRIALS, TRIALS_IN_NEED = 3, 6
 """The seam is as long as it should be once branches to so many places in a row do not pay; more are
 tried where more seam is needed at any price."""

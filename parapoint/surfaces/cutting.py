@@ -213,17 +213,13 @@ def _arcs(
     by_edge = np.argsort(mesh.edge_of_halfedge, kind="stable")
     start = (np.cumsum(mesh.edge_face_count) - mesh.edge_face_count)[crossable]
     faces = np.sort(np.stack([by_edge[start], by_edge[start + 1]], axis=1) // 3, axis=1)
-    # Two faces can share two edges: keep the longer arc, so that the graph has single edges.
-    order = np.lexsort([-arc, faces[:, 1], faces[:, 0]])
-    faces, arc, crossable = faces[order], arc[order], crossable[order]
-    single = np.append(True, (faces[1:] != faces[:-1]).any(axis=1))
-    cost = 1 + (arc.max() - arc[single]) / arc.max()  # in [1, 2]: no zeros for scipy to drop
+    # No two of these edges lie between the same two faces: the vertex that both would end at has no
+    # other edge, so one of them is in the tree.
+    cost = 1 + (arc.max() - arc) / arc.max()  # in [1, 2]: no zeros for scipy to drop
     size = len(mesh.faces)
-    dual = sparse.coo_matrix((cost, tuple(faces[single].T)), (size, size)).tocsr()
+    dual = sparse.coo_matrix((cost, tuple(faces.T)), (size, size)).tocsr()
     crossed = csgraph.minimum_spanning_tree(dual).tocoo()
-    in_cotree = (
-        np.isin(faces @ [size, 1], crossed.row.astype(np.int64) * size + crossed.col) & single
-    )
+    in_cotree = np.isin(faces @ [size, 1], crossed.row.astype(np.int64) * size + crossed.col)
     left = np.flatnonzero(~in_cotree)
     shortest = crossable[left[np.argsort(arc[left], kind="stable")[:count]]]
 

@@ -17,7 +17,7 @@ from parapoint.parameters import check_number
 from parapoint.planar.descent import LEAST_ENERGY, Run, sound
 from parapoint.planar.domains import FlatteningError
 from parapoint.planar.embedding import embeddable
-from parapoint.planar.growth import grown
+from parapoint.planar.growth import PRICE, grown
 from parapoint.surfaces.areas import MOST_STARVED, starved_share
 from parapoint.surfaces.cutting import cut_along, disk_cut, edge_lengths
 from parapoint.surfaces.parameterization import Parameterization
@@ -61,7 +61,7 @@ class Unwrap:
 
     points: int | None = None
     time_budget: float | None = None
-    price: float | None = 1.0
+    price: float | None = PRICE
     max_distortion: float | None = None
 
     requires: ClassVar[frozenset[str]] = frozenset({"faces", "manifold", "oriented", "connected"})

@@ -46,10 +46,10 @@ def assert_golden(spec, case):
 @pytest.mark.parametrize(
     ("case", "genus", "boundary_loops", "seam_edges"),
     [
-        ("hand_1_i_f5000", 0, 1, 139),
+        ("hand_1_i_f5000", 0, 1, 128),
         ("cylinder_cgal", 0, 1, 0),
-        ("spot_c3d", 0, 0, 95),
-        ("fertility", 4, 0, 273),
+        ("spot_c3d", 0, 0, 83),
+        ("fertility", 4, 0, 259),
         ("kitten", 1, 0, 103),
     ],
 )
