@@ -96,7 +96,7 @@ def _seeds(_: click.Context, __: click.Parameter, text: str | None) -> list[int]
     "--executor",
     default="local",
     show_default=True,
-    metavar="local|dask://HOST:PORT|slurm",
+    metavar="local|dask[+tls]://HOST:PORT|slurm",
     help="Where cells run: here, or on the workers of a cluster (docs/SCALE.md).",
 )
 @click.option(

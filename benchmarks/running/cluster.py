@@ -219,6 +219,10 @@ def dask_client(address: str, opened: contextlib.ExitStack) -> Client:
     connect: Any = distributed.Client
     try:
         client = connect(address, timeout=CONNECT_SECONDS)
+    except TypeError:  # what distributed raises without certificates
+        raise InputError(
+            f"{address}: dask is told of no certificates; set distributed.comm.tls (docs/SCALE.md)"
+        ) from None
     except (OSError, ValueError):
         raise InputError(
             f"no dask scheduler answers at {address}: start one with `dask scheduler`"

@@ -19,6 +19,11 @@ from benchmarks.running.local import Local
 from benchmarks.running.tasks import Executor, Tick
 from parapoint.errors import InputError
 
+PROTOCOLS = {"dask": "tcp", "dask+tls": "tls"}
+"""How a scheduler is reached, by the scheme of its executor. Over tcp anybody who reaches it can
+run code on the workers; the certificates of tls are those of dask's own configuration
+(`distributed.comm.tls`)."""
+
 
 def executor(name: str, folder: Path, *, jobs: int, memory: float | None, tick: Tick) -> Executor:
     """The executor of a name: local, dask://HOST:PORT or slurm.
@@ -37,8 +42,11 @@ def executor(name: str, folder: Path, *, jobs: int, memory: float | None, tick: 
     if name == "local":
         return Local(folder, environment.threads(jobs), tick)
     scheme, _, address = name.partition("://")
-    if name != "slurm" and not (scheme == "dask" and address):
-        raise InputError(f"there is no executor {name!r}; there are local, dask://HOST:PORT, slurm")
+    if name != "slurm" and not (scheme in PROTOCOLS and address):
+        raise InputError(
+            f"there is no executor {name!r}; there are local, dask://HOST:PORT, "
+            "dask+tls://HOST:PORT, slurm"
+        )
     for package in ("distributed", *["dask_jobqueue"] * (name == "slurm")):
         if importlib.util.find_spec(package) is None:
             raise InputError(
@@ -50,4 +58,6 @@ def executor(name: str, folder: Path, *, jobs: int, memory: float | None, tick: 
     threads = environment.threads(environment.cores())
     if name == "slurm":
         return Remote(functools.partial(slurm_client, jobs, memory, threads), folder, jobs, tick)
-    return Remote(functools.partial(dask_client, f"tcp://{address}"), folder, jobs, tick)
+    return Remote(
+        functools.partial(dask_client, f"{PROTOCOLS[scheme]}://{address}"), folder, jobs, tick
+    )

@@ -14,7 +14,7 @@ from parapoint.method import UnsupportedError
 from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, Surface, flat_faces
 
-ROUNDING = 1e-6
+ROUNDING = 1e-8
 """Squared distances that differ by no more than this share count as the same."""
 
 

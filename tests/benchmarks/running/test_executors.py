@@ -188,7 +188,7 @@ def test_a_cell_that_lost_two_workers_runs_again_next_time(tmp_path, monkeypatch
 @pytest.mark.parametrize(
     ("name", "memory", "says"),
     [
-        ("nonsense", 1, "there are local, dask://HOST:PORT, slurm"),
+        ("nonsense", 1, "there are local, dask://HOST:PORT, dask+tls://HOST:PORT"),
         ("dask://", 1, "there are local"),
         ("dask://127.0.0.1:9", None, "--memory"),
     ],
