@@ -20,9 +20,9 @@ A method is one small dataclass. Its fields are its hyperparameters, its docstri
         requires: ClassVar[frozenset[str]] = frozenset({"faces"})
 
         def parameterize(self, surface, *, seed):
-            centred = surface.vertices - surface.vertices.mean(axis=0)
-            axes = np.linalg.svd(centred, full_matrices=False)[2][:2]
-            return Parameterization(self.scale * centred @ axes.T, surface.faces)
+            used = surface.vertices[np.unique(surface.faces)]
+            axes = np.linalg.svd(used - used.mean(axis=0), full_matrices=False)[2][:2]
+            return Parameterization(self.scale * surface.vertices @ axes.T, surface.faces)
 
 Run it, as it is or with other parameters:
 
