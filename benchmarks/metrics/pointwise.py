@@ -188,21 +188,21 @@ def _area_log_ratio(point_map: PointMap) -> FloatArray:
 def _local_ratio(point_map: PointMap) -> FloatArray:
     """(P,) local area, sigma1 sigma2, over its mean.
 
-    nan where the neighbourhood spans no plane, or the map tears in it: the two sides of a seam lie
-    far apart in UV, and the area between them would make all others small.
+    nan where the neighbourhood spans no plane. So it is where the map tears and the area is above
+    the median: the two sides of a seam lie far apart in UV, and what lies between them would make
+    all other areas small. What is squeezed one way alone looks torn, too, and stays.
     """
     larger, smaller = point_map.singular_values.T
-    known = (larger > 0) & ~point_map.spanning
-    area = np.where(known, larger * smaller, np.nan)
-    total = np.nanmean(area) if known.any() else 0.0
+    area = np.where(larger > 0, larger * smaller, np.nan)
+    if not (larger > 0).any():
+        return area
+    area[point_map.spanning & (area > np.nanmedian(area))] = np.nan
+    total = np.nanmean(area)
     return area / total if total > 0 else np.full(len(area), np.nan)
 
 
 def starved_point_fraction(point_map: PointMap) -> float:
-    """Share of the points with a local area below a quarter of the mean; 1 without any.
-
-    Points where the map tears are left out.
-    """
+    """Share of the points with a local area below a quarter of the mean; 1 without any."""
     ratio = _local_ratio(point_map)
     known = np.isfinite(ratio)
     return float((ratio[known] < STARVED).mean()) if known.any() else 1.0
