@@ -16,7 +16,7 @@ FO = (b"fo ", b"fo\t")
 
 
 def obj(data: bytes) -> Content:
-    """Wavefront OBJ: v, vt, f and fo; indices may be negative, faces polygons, UV on some corners."""
+    """Wavefront OBJ: v, vt, f, fo; negative indices, polygons, UV on some corners or all."""
     text = re.sub(rb"#[^\r\n]*", b"", data) if b"#" in data else data
     lines = [
         line.strip() for line in text.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines()

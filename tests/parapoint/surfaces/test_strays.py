@@ -87,8 +87,8 @@ def test_a_clump_is_told_and_mapped_nowhere(caplog: pytest.LogCaptureFixture) ->
 def test_two_objects_of_equal_size_are_no_strays() -> None:
     """However far they are apart; nor is a small one close by."""
     for away in (10, 1e3, 1e6):
-        assert not stray_points(np.concatenate([dome(), dome() + [away, 0, 0]])).any()
-    assert not stray_points(np.concatenate([dome(), 0.2 * dome(60) + [8, 0, 0]])).any()
+        assert not stray_points(np.concatenate([dome(), dome() + np.array([away, 0, 0])])).any()
+    assert not stray_points(np.concatenate([dome(), 0.2 * dome(60) + np.array([8, 0, 0])])).any()
 
 
 def test_components_and_small_clouds_are_no_strays() -> None:
