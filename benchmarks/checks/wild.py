@@ -9,6 +9,7 @@ the file can be understood.
 from __future__ import annotations
 
 import base64
+import io
 import json
 import logging
 import struct
@@ -20,6 +21,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import click
+import laspy
 import numpy as np
 
 from baselines import registry
@@ -29,7 +31,7 @@ from parapoint.commands.unwrapping import Request, unwrap_mesh
 from parapoint.computed.computed_map import ComputedMap
 from parapoint.errors import InputError
 from parapoint.files.reading import Polygons, read_parameterized, read_polygons, read_surface
-from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, unit_normals
+from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, PointCloud, unit_normals
 from parapoint.textures.placing import BORDER
 from parapoint.unwrapping.unwrap import Unwrap
 
@@ -359,6 +361,38 @@ def pcd() -> Iterator[Case]:
             yield Case(f"{name}_{ends}.pcd", data, _shows(POINTS))
 
 
+def las() -> Iterator[Case]:
+    """Noise and withheld points, which are left out; colours of 8 and 16 bits, packed or not."""
+    colours = np.array([[0, 128, 255], [9, 10, 11], [255, 0, 0], [1, 2, 3], [7, 8, 9]])
+    points = np.concatenate([POINTS, [[1e6, 0, 0], [-1e6, 0, 0]]])
+    for name, classes, withheld, kept in (
+        ("whole", [0, 1, 2, 3, 6], [0] * 5, [0, 1, 2, 3, 4]),
+        ("low_noise", [2, 2, 2, 7, 7], [0] * 5, [0, 1, 2]),
+        ("high_noise", [2, 2, 2, 18, 18], [0] * 5, [0, 1, 2]),
+        ("withheld", [2] * 5, [0, 0, 0, 1, 1], [0, 1, 2]),
+        ("noise_and_withheld", [2, 7, 2, 18, 2], [0, 0, 0, 0, 1], [0, 2]),
+    ):
+        for bits, ending in ((8, ".las"), (16, ".las"), (8, ".laz"), (16, ".laz")):
+            values = colours * (257 if bits == 16 else 1)
+            cloud = laspy.LasData(laspy.LasHeader(point_format=7, version="1.4"))
+            cloud.x, cloud.y, cloud.z = points.T
+            cloud.classification, cloud.withheld = np.array(classes), np.array(withheld)
+            cloud.red, cloud.green, cloud.blue = values.astype(np.uint16).T
+            file = io.BytesIO()
+            cloud.write(file, do_compress=ending == ".laz")
+            is_right = partial(_has_colours, points=points[kept], colours=values[kept], bits=bits)
+            yield Case(f"{name}_{bits}{ending}", file.getvalue(), is_right)
+
+
+def _has_colours(path: Path, points: FloatArray, colours: IntArray, bits: int) -> bool:
+    """Whether these points (N, 3) are read, with these colours (N, 3) of so many bits."""
+    surface = read_surface(path)
+    assert isinstance(surface, PointCloud)
+    found = surface.attributes["colours"]
+    is_there = surface.points.shape == points.shape and np.allclose(surface.points, points)
+    return is_there and found.dtype.itemsize * 8 == bits and np.array_equal(found, colours)
+
+
 FAMILIES: dict[str, Callable[[], Iterator[Case]]] = {
     "split vertices": split_vertices,
     "strays": strays,
@@ -368,6 +402,7 @@ FAMILIES: dict[str, Callable[[], Iterator[Case]]] = {
     "marks": marks,
     "scan lines": scan_lines,
     "PCD": pcd,
+    "LAS": las,
     "written": written,
 }
 """The files of each family."""

@@ -20,6 +20,7 @@ from parapoint.fitting import Fitted, Progress, Session
 from parapoint.parameters import check_choice, check_whole
 from parapoint.surfaces.frame import Frame
 from parapoint.surfaces.sampling import FEWEST_POINTS, training_points, without_coincident
+from parapoint.surfaces.strays import named
 from parapoint.surfaces.surface import FloatArray, PointCloud, Surface, vertex_normals
 
 logger = logging.getLogger("parapoint")
@@ -103,7 +104,10 @@ class ComputedMap(Estimator):
         flat, cloud = _as_the_normals(drawn.flat, drawn, surface), drawn.cloud
         if missing := len(cloud) - len(flat.anchors):
             logger.warning(
-                "%d of %d points are not on the surface that was found", missing, len(cloud)
+                "%d of %d points are not on the surface that was found%s",
+                missing,
+                len(cloud),
+                _rows_of(np.delete(cloud, flat.anchors, axis=0), drawn.frame, surface),
             )
         cut_short = time.monotonic() > deadline
         if cut_short:
@@ -136,6 +140,14 @@ class _Drawn(NamedTuple):
     frame: Frame
     cloud: FloatArray
     flat: FlatMap
+
+
+def _rows_of(missing: FloatArray, frame: Frame, surface: Surface) -> str:
+    """The rows of a cloud in which these points (n, 3) of the frame are, for a message."""
+    if not isinstance(surface, PointCloud):
+        return ""
+    rows = np.unique(cKDTree(surface.points).query(frame.outside(missing))[1])
+    return f": row{'s' * (len(rows) > 1)} {named(rows)}"
 
 
 def _as_the_normals(flat: FlatMap, drawn: _Drawn, surface: Surface) -> FlatMap:

@@ -11,15 +11,18 @@ from parapoint.files.content import NO_UV, Content, numbers, word_counts
 from parapoint.surfaces.surface import FloatArray, IntArray
 
 V, VT, F = (b"v ", b"v\t"), (b"vt ", b"vt\t"), (b"f ", b"f\t")
+FO = (b"fo ", b"fo\t")
 """Beginnings of the lines that are read."""
 
 
 def obj(data: bytes) -> Content:
-    """Wavefront OBJ: v, vt and f; indices may be negative, faces polygons, UV on some corners."""
+    """Wavefront OBJ: v, vt, f, fo; negative indices, polygons, UV on some corners or all."""
     text = re.sub(rb"#[^\r\n]*", b"", data) if b"#" in data else data
     lines = [
         line.strip() for line in text.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines()
     ]
+    # "fo" is what faces with a border were called before 1993; they are faces as others.
+    lines = [b"f" + line[2:] if line.startswith(FO) else line for line in lines]
     points, point_sizes = _rows([line[1:] for line in lines if line.startswith(V)])
     uvs, uv_sizes = _rows([line[2:] for line in lines if line.startswith(VT)])
     if len(point_sizes) and point_sizes.min() < 3:

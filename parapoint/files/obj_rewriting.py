@@ -75,7 +75,7 @@ def rewrite_obj(
                 made.append(_from_folder(line, source, out))
         elif kind == b"l":
             made.append(b" ".join([kind, *(word.split(b"/")[0] for word in words[1:])]) + b"\n")
-        elif kind == b"f":
+        elif kind in {b"f", b"fo"}:
             if not began:
                 made.append(uv_lines)
                 began = True

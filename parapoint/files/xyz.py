@@ -173,7 +173,19 @@ def _further_columns(
 
 
 def pts(data: bytes) -> Content:
-    """PTS: lines "p x y z" (Hoppe), or of each scan a count, x y z and what a scanner adds."""
+    """PTS: lines "p x y z" (Hoppe), or of each scan a count, x y z and what a scanner adds.
+
+    Raises:
+        InputError: a scan has fewer points than its count announces; see `xyz`.
+    """
     lines = text_lines(data)
     marked = [line for line in lines if line.startswith(b"p ")]
-    return points_content(table(marked, (1, 2, 3))) if marked else xyz(data)
+    if marked:
+        return points_content(table(marked, (1, 2, 3)))
+    counts = [at for at, line in enumerate(lines) if line.strip().isdigit()]
+    if counts[:1] == [0]:
+        for at, after in zip(counts, [*counts[1:], len(lines)], strict=True):
+            announced, found = int(lines[at]), after - at - 1
+            if found < announced:
+                raise InputError(f"ends early: {announced} points are announced, {found} are there")
+    return xyz(data)

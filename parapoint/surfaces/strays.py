@@ -20,6 +20,10 @@ NEAREST = 6
 FEW = 10
 FEW_SHARE = 0.005
 """A group of points is stray if it has no more points than the larger of this number and share."""
+CLUMP_SHARE = 0.05
+"""A group of up to this share of the points is stray as well if it lies CLUMP_RADII away."""
+CLUMP_RADII = 10.0
+"""Distance from the middle of the largest group, in half diagonals of the box around that one."""
 MOST = 0.1
 """If a larger share of the points is in such groups, they are how the cloud is sampled."""
 SAMPLED = 5_000
@@ -112,8 +116,26 @@ def stray_points(points: FloatArray) -> BoolArray:
     links = coo_matrix((np.ones(len(pairs), dtype=bool), pairs.T), (len(cells),) * 2)
     group = connected_components(links, directed=False)[1][cell.reshape(-1)]
     count = np.bincount(group)
-    is_stray = (count <= max(FEW, FEW_SHARE * len(places))) & (count < count.max())
+    few = max(FEW, FEW_SHARE * len(places))
+    clumped = (count <= CLUMP_SHARE * len(places)) & _far_groups(places, group, count)
+    is_stray = ((count <= few) | clumped) & (count < count.max())
     found: BoolArray = is_stray[group][place.reshape(-1)]
     if found.mean() > MOST:
         return np.zeros(len(points), dtype=bool)
     return found
+
+
+def _far_groups(places: FloatArray, group: IntArray, count: IntArray) -> BoolArray:
+    """(G,) whether the mean place of each group lies CLUMP_RADII from the largest group's middle.
+
+    Args:
+        places: (N, 3) the points.
+        group: (N,) the group of each.
+        count: (G,) points of each group.
+    """
+    largest = places[group == count.argmax()]
+    low, high = largest.min(axis=0), largest.max(axis=0)
+    means = np.stack([np.bincount(group, column) / count for column in places.T], axis=1)
+    away = np.linalg.norm(means - (low + high) / 2, axis=1)
+    is_far: BoolArray = away > CLUMP_RADII * np.linalg.norm(high - low) / 2
+    return is_far

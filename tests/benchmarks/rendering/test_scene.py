@@ -9,6 +9,7 @@ from benchmarks.rendering.rays import Rays
 from benchmarks.rendering.scene import Scene, split
 from benchmarks.rendering.viewpoints import two_cameras, upright
 from parapoint.surfaces.surface import Mesh
+from parapoint.testing import similar
 
 Z, Y = np.eye(3)[2], np.eye(3)[1]
 
@@ -165,6 +166,23 @@ def test_the_same_input_gives_the_same_bytes():
         view = scene.view(two_cameras(scene)[0], 60)
         images.append(view.image(np.broadcast_to(CLAY, (len(view.face), 3))))
     assert images[0].tobytes() == images[1].tobytes()
+
+
+@pytest.mark.parametrize(("shift", "scale"), [(6e6, 1), (0, 1e-6), (6e6, 1e-6), (0, 1e6)])
+def test_a_picture_is_the_same_anywhere_and_in_any_unit(shift, scale):
+    """A checkerboard in the shadows of a bumpy ball, but for one pixel in a hundred."""
+    sphere = icosphere()
+    bumps = 1 + 0.3 * np.sin(4 * sphere.vertices[:, :1]) * np.cos(5 * sphere.vertices[:, 1:2])
+    home = Mesh(sphere.vertices * bumps, sphere.faces)
+    uv = home.vertices[home.faces][..., :2]
+    images = []
+    for mesh in (home, similar(home, shift, scale)):
+        scene = Scene(mesh)
+        view = scene.view(camera(mesh, np.array([1.0, 0.4, 2.0]), Y), 80)
+        images.append(view.image(view.checker(uv, 6)).astype(int))
+    differ = np.abs(images[0] - images[1]).max(axis=2) > 2
+    assert images[0][..., 3].any()
+    assert differ.mean() <= 0.01
 
 
 def test_degenerate_faces_and_unused_vertices_do_no_harm():

@@ -324,3 +324,33 @@ def test_stl_with_notes_behind_its_triangles(tmp_path: Path) -> None:
     data = bytes(80) + struct.pack("<I", 1) + triangle
     for notes in (b"", b"colour=red", bytes(60)):
         assert len(of_file(tmp_path, "a.stl", data + notes)) == 3
+
+
+@pytest.mark.parametrize(
+    ("text", "announced", "found"),
+    [
+        ("5\n1 2 3\n4 5 6\n", 5, 2),
+        ("2\n1 2 3\n4 5 6\n3\n1 2 3\n", 3, 1),
+        ("3\n1 2 3\n2\n4 5 6\n4 5 7\n", 3, 1),
+        ("2\r\n1,5 2,5 3,5\r\n", 2, 1),
+        ("4\n1 2 3 -7 9 9 9\n1 2 4 -7 9 9 9\n1 2 5 -7 9 9 9\n", 4, 3),
+    ],
+)
+def test_a_pts_file_that_ends_early_is_refused(
+    tmp_path: Path, text: str, announced: int, found: int
+) -> None:
+    """One line with both numbers, whichever scan it is."""
+    with pytest.raises(InputError, match=f"{announced} points are announced, {found} are there"):
+        of_file(tmp_path, "a.pts", text)
+
+
+@pytest.mark.parametrize("corners", ["1 2 3", "1/1 2/2 3/3", "-3/-3 -2/-2 -1/-1", "1//1 2//2 3//3"])
+@pytest.mark.parametrize("key", ["fo ", "fo\t"])
+def test_faces_of_the_old_name(tmp_path: Path, corners: str, key: str) -> None:
+    """`fo` was a face before 1993."""
+    path = tmp_path / "a.obj"
+    uv = "vt 0 0\nvt 1 0\nvt 0 1\nvn 0 0 1\n"
+    path.write_text(TRIANGLE.replace("f 1 2 3\n", uv + key + corners + "\n" + "f 1 2 3\n"))
+    surface = read_surface(path)
+    assert isinstance(surface, Mesh)
+    assert_array_equal(surface.faces, [[0, 1, 2], [0, 1, 2]])

@@ -52,6 +52,45 @@ def test_scan_lines_are_no_strays(gap: float) -> None:
     assert not stray_points(lines).any()
 
 
+def clump(count: int, *place: float) -> FloatArray:
+    """Points close together around a place."""
+    return np.random.default_rng(2).normal(scale=0.1, size=(count, 3)) + place
+
+
+@pytest.mark.parametrize(
+    "clumps",
+    [
+        [clump(60, 30, 0, 0)],
+        [clump(30, 0, 30, 0)],  # two of a hundred
+        [clump(25, *place) for place in [(30, 0, 0), (-30, 0, 0), (0, 40, 0), (0, 0, 500)]],
+        [clump(70, 1e6, 1e6, 0)],
+        [clump(5, 0, 0, -30), clump(60, 0, 0, 30)],
+    ],
+)
+def test_clumps_of_strays(clumps: list[FloatArray]) -> None:
+    """Up to five of a hundred points in one clump; in the last rows or the first."""
+    points = np.concatenate([dome(), *clumps])
+    expected = np.arange(len(points)) >= 1500
+    assert_array_equal(stray_points(points), expected)
+    assert_array_equal(stray_points(points[::-1]), expected[::-1])
+
+
+def test_a_clump_is_told_and_mapped_nowhere(caplog: pytest.LogCaptureFixture) -> None:
+    """As single strays are."""
+    points = np.concatenate([dome(600), clump(20, 30, 0, 0)])
+    with caplog.at_level(logging.WARNING):
+        found = ComputedMap().parameterize(PointCloud(points), seed=0)
+    assert "20 of 620 points lie far from all others" in caplog.text
+    assert_array_equal(np.isnan(found.uv).all(axis=1), np.arange(620) >= 600)
+
+
+def test_two_objects_of_equal_size_are_no_strays() -> None:
+    """However far they are apart; nor is a small one close by."""
+    for away in (10, 1e3, 1e6):
+        assert not stray_points(np.concatenate([dome(), dome() + np.array([away, 0, 0])])).any()
+    assert not stray_points(np.concatenate([dome(), 0.2 * dome(60) + np.array([8, 0, 0])])).any()
+
+
 def test_components_and_small_clouds_are_no_strays() -> None:
     """A second dome far off; four points; one place."""
     assert not stray_points(np.concatenate([dome(), dome(400) + np.array([50, 0, 0])])).any()

@@ -4,6 +4,7 @@ import pytest
 import trimesh
 
 from parapoint.files.reading import read_parameterized
+from parapoint.testing import similar
 from reports.contents import contents
 from reports.pictures import exports
 
@@ -33,6 +34,31 @@ def test_other_programs_read_the_exports_back(tmp_path, mesh, result):
     found = lab.current_mesh().wedge_tex_coord_matrix().reshape(-1, 3, 2)
     np.testing.assert_allclose(found, expected, atol=1e-6)
     assert lab.current_mesh().texture_number() == 1
+
+
+@pytest.mark.parametrize(("shift", "scale"), [(6e6, 1), (0, 1e-6), (6e6, 1e-6)])
+@pytest.mark.parametrize("ending", ["obj", "glb"])
+def test_exports_are_the_same_anywhere_and_in_any_unit(tmp_path, ending, shift, scale):
+    """Triangles about their lowest corner, in sizes; UV; both as at home."""
+    size = np.ptp(ball().vertices, axis=0).max()
+    found = []
+    for name, mesh, unit in (
+        ("home", ball(), size),
+        ("away", similar(ball(), shift, scale), size * scale),
+    ):
+        exports.textured(tmp_path / name, mesh, lonlat(ball()))
+        read, flat_map = read_parameterized(tmp_path / f"{name}.{ending}")
+        triangles = read.vertices[read.faces]
+        found.append(
+            (
+                (triangles - triangles.min(axis=(0, 1))) / unit,
+                flat_map.uv[flat_map.corners],
+            )
+        )
+    (home, uv), (away, moved_uv) = found
+    assert home.max() == pytest.approx(1, abs=1e-3)
+    np.testing.assert_allclose(away, home, atol=1e-3)
+    np.testing.assert_allclose(moved_uv, uv, atol=1e-3)
 
 
 def test_exports_are_written_once_and_faults_told(tmp_path):
