@@ -82,6 +82,8 @@ def _with_all_corners(triangles: IntArray, count: int) -> IntArray:
     """
     cut: list[tuple[int, int, int]] = []
     kept = np.unique(triangles)
+    if len(kept) == count:
+        return triangles[::-1]
     following = dict(zip(kept.tolist(), np.roll(kept, -1).tolist(), strict=True))
     waiting = [(int(a), int(b), int(c)) for a, b, c in triangles]
     while waiting:

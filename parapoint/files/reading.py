@@ -269,12 +269,16 @@ def _rows_of_one_place(
     served[row] = position
     if np.array_equal(served[row], position):
         return uv, corners
-    _, place = np.unique(position, axis=0, return_inverse=True)
-    pairs, pair = np.unique(np.stack([row, place.reshape(-1)], axis=1), axis=0, return_inverse=True)
+    places, place = np.unique(mesh.vertices, axis=0, return_inverse=True)
+    # One number for a row and a place: numbers sort far faster than pairs.
+    pairs, pair = np.unique(
+        row * len(places) + place.reshape(-1)[mesh.faces.reshape(-1)], return_inverse=True
+    )
+    pair_row = pairs // len(places)
     again = np.zeros(len(pairs), dtype=bool)
-    again[1:] = pairs[1:, 0] == pairs[:-1, 0]
-    new_row = np.where(again, len(uv) + np.cumsum(again) - 1, pairs[:, 0])
-    return np.concatenate([uv, uv[pairs[again, 0]]]), new_row[pair.reshape(-1)].reshape(-1, 3)
+    again[1:] = pair_row[1:] == pair_row[:-1]
+    new_row = np.where(again, len(uv) + np.cumsum(again) - 1, pair_row)
+    return np.concatenate([uv, uv[pair_row[again]]]), new_row[pair.reshape(-1)].reshape(-1, 3)
 
 
 def _point_cloud(content: Content, path: Path) -> PointCloud:
