@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from parapoint.errors import InputError
+from parapoint.files.decoding import check_archive
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization, TracePoint
 from parapoint.surfaces.surface import Mesh, PointCloud, Surface
 
@@ -113,14 +114,18 @@ def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
     """The arrays of the npz file `path`; nothing in it is unpickled.
 
     Raises:
-        InputError: the file is missing or damaged.
+        InputError: the file is missing or damaged, or decodes to more than it may.
     """
     try:
         # We open the file ourselves, since numpy leaves one open that is not an archive.
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
+        with path.open("rb") as stream:
+            check_archive(stream)
+            with np.load(stream, allow_pickle=False) as archive:
+                arrays = {name: archive[name] for name in archive.files}
     except FileNotFoundError:
         raise InputError(f"{path}: missing") from None
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
     except _DAMAGE as error:
         raise InputError(f"{path}: damaged ({error})") from None
     return {

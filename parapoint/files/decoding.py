@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+import typing
+import zipfile
 from contextvars import ContextVar
 
 from parapoint.errors import InputError
@@ -73,3 +76,16 @@ def check_decoded(size: int, file_size: int) -> None:
             f"has {file_size:,} bytes that decode to {size:,}, more than {DECODED_TIMES} times as "
             f"much; unpack it by the tool that wrote it, or allow --memory {gigabytes} GB"
         )
+
+
+def check_archive(stream: typing.IO[bytes]) -> None:
+    """Check an npz file as `check_decoded` does; the stream is left at its start.
+
+    Raises:
+        InputError: the arrays are larger than is allowed.
+        zipfile.BadZipFile: the stream is no archive.
+    """
+    file_size = stream.seek(0, os.SEEK_END)
+    with zipfile.ZipFile(stream) as archive:
+        check_decoded(sum(item.file_size for item in archive.infolist()), file_size)
+    stream.seek(0)

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import io
-import zipfile
 
 import numpy as np
 
 from parapoint.errors import InputError
 from parapoint.files.content import Content, points_content
-from parapoint.files.decoding import check_decoded
+from parapoint.files.decoding import check_archive
 
 
 def npz(data: bytes) -> Content:
     """Arrays points, normals and whatever else is known; or vertices, faces, uv and corners."""
     if not data:
         raise InputError("is empty")
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        check_decoded(sum(item.file_size for item in archive.infolist()), len(data))
+    check_archive(io.BytesIO(data))
     with np.load(io.BytesIO(data), allow_pickle=False) as file:
         arrays = {name: np.asarray(file[name]) for name in file.files}
     if "vertices" in arrays and "faces" in arrays:

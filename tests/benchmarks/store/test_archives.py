@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +44,15 @@ def test_a_write_that_fails_leaves_what_was_there(tmp_path):
         write_arrays(path, {"a": np.array([object()])})
     assert [file.name for file in tmp_path.iterdir()] == ["a.npz"]
     np.testing.assert_array_equal(read_arrays(path)["a"], [0, 1, 2])
+
+
+def test_an_archive_that_decodes_to_far_more_is_refused_before_it_is_read(tmp_path):
+    path = tmp_path / "bomb.npz"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in "abc":
+            archive.writestr(f"{name}.npy", bytes(24 * 2**20))
+    with pytest.raises(InputError, match=r"bomb\.npz: has .* bytes that decode to 75,497,472"):
+        read_arrays(path)
 
 
 def test_large_indices_keep_their_values(tmp_path):
