@@ -313,6 +313,8 @@ def strays() -> Iterator[Case]:
         ("some_million", _dome(), 1e6 * far),
         ("zeros", _dome() + away, np.zeros((20, 3))),
         ("nodata", _dome(), np.full((20, 3), -9999.0)),
+        ("clump_30", _dome(), 0.1 * far + [30, 0, 0]),
+        ("clumps_30", _dome(), np.concatenate([0.1 * far + 30 * axis for axis in np.eye(3)])),
         ("none", _dome(), np.zeros((0, 3))),
     ):
         data = _text(np.concatenate([points, rows]))

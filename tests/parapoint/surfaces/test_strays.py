@@ -84,6 +84,14 @@ def test_a_clump_is_told_and_mapped_nowhere(caplog: pytest.LogCaptureFixture) ->
     assert_array_equal(np.isnan(found.uv).all(axis=1), np.arange(620) >= 600)
 
 
+def test_points_off_the_surface_that_was_found_are_named(caplog: pytest.LogCaptureFixture) -> None:
+    """A clump too near to be stray is told by its rows."""
+    points = np.concatenate([dome(600), clump(30, 5, 0, 0)])
+    with caplog.at_level(logging.WARNING):
+        ComputedMap().fit(points)
+    assert "30 of 630 points are not on the surface that was found: rows 600, 601," in caplog.text
+
+
 def test_two_objects_of_equal_size_are_no_strays() -> None:
     """However far they are apart; nor is a small one close by."""
     for away in (10, 1e3, 1e6):
