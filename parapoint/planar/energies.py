@@ -9,7 +9,7 @@ import numpy as np
 
 from parapoint.planar.domains import Domain
 from parapoint.planar.scaffold import LARGE
-from parapoint.surfaces.surface import FloatArray, IntArray
+from parapoint.surfaces.surface import FloatArray
 
 Density = Callable[[FloatArray, FloatArray], FloatArray]
 
@@ -26,33 +26,24 @@ exp(density), which would overflow at a far start.
 """
 
 
-def stepper(
-    disk: Domain,
-    uv: FloatArray,
-    energy: str,
-    held: IntArray | None = None,
-    weight: float = 0.0,
-) -> Callable[[int], FloatArray]:
+def stepper(disk: Domain, uv: FloatArray, energy: str) -> Callable[[int], FloatArray]:
     """A function that takes so many more of libigl's steps and gives the map (V, 2).
 
-    The unit of the surface makes no difference: see `parapoint.planar.bijection.LARGE`.
+    The unit of the surface makes no difference: see `parapoint.planar.scaffold.LARGE`.
 
     Args:
         disk: the surface.
         uv: (V, 2) where it starts, without flips.
         energy: key of DENSITIES.
-        held: (n,) vertices that are drawn to where they start.
-        weight: of that pull.
     """
-    fixed = np.zeros(0, dtype=np.int64) if held is None else held
     scale = LARGE / disk.area**0.5
     state = igl.slim_precompute(
         np.asfortranarray(scale * disk.vertices),
         np.asfortranarray(disk.faces.astype(np.int32)),
         np.asfortranarray(scale * uv),
         igl.MappingEnergyType.__members__[energy.upper()],
-        fixed.astype(np.int32),
-        np.asfortranarray(scale * uv[fixed]),
-        weight,
+        np.zeros(0, dtype=np.int32),
+        np.zeros((0, 2), order="F"),
+        0.0,
     )
     return lambda steps: np.ascontiguousarray(igl.slim_solve(state, steps) / scale)
