@@ -114,7 +114,7 @@ def test_a_map_stays_one_to_one_where_free_steps_do_not():
     free = registry.method("slim")[1].parameterize(mesh, seed=0)
     assert len(crossing_vertices(mesh, free.uv)) > 0
     run = Run(mesh)
-    run.begin(None)
+    run.begin()
     run.improve()
     assert len(crossing_vertices(mesh, run.uv)) == 0
     assert (signed_areas(run.uv, mesh.faces) > 0).all()
@@ -166,7 +166,7 @@ def test_a_branch_must_pay():
     energies = []
     for price in (1e9, 0.05):
         run = Run(cap)
-        run.begin(None)
+        run.begin()
         run.improve()
         run = grown(run, price)
         energies.append(run.energy)
@@ -180,7 +180,7 @@ def test_the_price_of_a_seam_is_the_same_at_every_scale():
     found = []
     for scale in (1, 2.0**10):  # exact: the two runs differ by nothing but the unit
         run = Run(Mesh(scale * cap.vertices, cap.faces))
-        run.begin(None)
+        run.begin()
         run.improve()
         run = grown(run, 0.05)
         found.append((run.branches, run.energy))
