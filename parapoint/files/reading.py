@@ -80,7 +80,9 @@ def read_surface(path: str | Path) -> Surface:
     path = Path(path)
     with faults_of(path):
         content = _content(path)
-        return _mesh(content)[0] if len(content.sizes) else _point_cloud(content, path)
+        if not len(content.sizes):
+            return _point_cloud(content, path)
+        return _mesh(content)[0]
 
 
 class Polygons(NamedTuple):
