@@ -242,9 +242,10 @@ def _content(path: Path) -> Content:
 def _check_fits_together(content: Content) -> None:
     """Check that normals, UVs and UVs of corners are numbers of the shapes that `Content` has."""
     count = len(content.vertices)
+    uv_count = 0 if content.uv is None else content.uv.size // 2
     for name, values, shape in (
         ("normals", content.normals, (count, 3)),
-        ("UVs", content.uv, (np.size(content.uv) // 2, 2)),
+        ("UVs", content.uv, (uv_count, 2)),
         ("UVs of corners", content.uv_corners, content.corners.shape),
     ):
         if values is not None and (values.shape != shape or values.dtype.kind not in "fiu"):
