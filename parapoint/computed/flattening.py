@@ -1,6 +1,7 @@
 """A map of a bare cloud with short seams, computed without training.
 
-The cloud is triangulated, cut, and flattened by a bijective map. The cuts lead to where the scale
+The cloud is thinned where it is scanned in lines (`parapoint.surfaces.scan_lines`), triangulated,
+cut, and flattened by a bijective map. The cuts lead to where the scale
 of a conformal map, found by a linear solve, is most extreme (as in Sawhney and Crane 2017,
 "Boundary first flattening", section 6), and are as long as an even scale needs, and to what would
 be too small for numbers without. The map is laid out by that scale (`parapoint.computed.layout`),
@@ -30,6 +31,7 @@ from parapoint.surfaces.cutting import (
     origin,
 )
 from parapoint.surfaces.parameterization import Charted, Parameterization
+from parapoint.surfaces.scan_lines import Lines, thinned
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 
 AREA_DISCREPANCY = 0.6
@@ -55,6 +57,7 @@ class FlatMap(NamedTuple):
 
     Attributes:
         anchors: (A,) rows of the cloud.
+        missed: (B,) rows that the triangulation did not reach.
         uv: (A, 2) images; the map keeps the total area.
         jacobians: (A, 2, 3) d uv / d x.
         inverse_jacobians: (A, 3, 2) d x / d uv.
@@ -64,6 +67,7 @@ class FlatMap(NamedTuple):
     """
 
     anchors: IntArray
+    missed: IntArray
     uv: FloatArray
     jacobians: FloatArray
     inverse_jacobians: FloatArray
@@ -86,6 +90,7 @@ class Flattened(NamedTuple):
 
     Attributes:
         rows: (A,) rows of the cloud that the triangulation reached.
+        missed: (B,) rows that it did not reach; those in neither were thinned out.
         mesh: the triangulation of these A points.
         disk: the mesh cut to a planar domain of M vertices.
         origin: (M,) the vertex of `mesh` that each one of `disk` is or copies.
@@ -94,6 +99,7 @@ class Flattened(NamedTuple):
     """
 
     rows: IntArray
+    missed: IntArray
     mesh: Mesh
     disk: Mesh
     origin: IntArray
@@ -116,15 +122,19 @@ def flattened(
 
     Raises:
         ReconstructionError: the points show no surface that can be followed and flattened.
+        InputError: the points lie on lines too far apart.
     """
-    mesh, is_denoised = _still(points)
+    lines = thinned(points)
+    rows = np.arange(len(points)) if lines is None else lines.rows
+    mesh, is_denoised = _still(points[rows], lines)
     reached = np.flatnonzero(mesh.referenced)
-    if len(reached) < LEAST_PART * len(points):
+    if len(reached) < LEAST_PART * len(rows):
         raise ReconstructionError(
-            f"the largest component holds {len(reached)} of {len(points)} points"
+            f"the largest component holds {len(reached)} of {len(rows)} points"
         )
-    row = np.full(len(points), -1, dtype=np.int64)
+    row = np.full(len(rows), -1, dtype=np.int64)
     row[reached] = np.arange(len(reached))
+    missed = rows[~mesh.referenced]
     mesh = Mesh(mesh.vertices[reached], row[mesh.faces])
     try:
         disk = _seamed(mesh)
@@ -134,7 +144,7 @@ def flattened(
         raise ReconstructionError(f"the triangulation has no flat map ({error})") from None
     uv -= (uv.max(axis=0) + uv.min(axis=0)) / 2
     uv *= np.sqrt(disk.face_areas.sum() / signed_areas(uv, disk.faces).sum())
-    return Flattened(reached, mesh, disk, origin(mesh, disk), uv, is_denoised)
+    return Flattened(rows[reached], missed, mesh, disk, origin(mesh, disk), uv, is_denoised)
 
 
 def flat_map(
@@ -160,23 +170,24 @@ def flat_map(
         "faces": len(flat.mesh.faces),
         "seam_edges": (boundary[1] - boundary[0]) // 2,
         "denoised": flat.is_denoised,
+        "thinned": len(points) - len(flat.rows) - len(flat.missed),
         "distortion": distortion,
     }
     inverse: FloatArray = np.asarray(np.linalg.pinv(jacobians, rcond=0.1), dtype=np.float64)
     charted = Charted(flat.mesh, Parameterization(flat.uv, flat.disk.faces))
-    return FlatMap(flat.rows, flat.uv[chosen], jacobians, inverse, facts, charted)
+    return FlatMap(flat.rows, flat.missed, flat.uv[chosen], jacobians, inverse, facts, charted)
 
 
-def _still(points: FloatArray) -> tuple[Mesh, bool]:
-    """A triangulation of points (N, 3), and whether it is of the denoised ones.
+def _still(points: FloatArray, lines: Lines | None) -> tuple[Mesh, bool]:
+    """A triangulation of points (N, 3), perhaps on lines, and whether it is of denoised ones.
 
     Details as fine as the spacing look like noise. So that they stay, the denoised points are taken
     only where most defects of the triangulation go with the noise.
     """
-    mesh, moved = triangulation(points), denoised(points)
+    mesh, moved = triangulation(points, lines), denoised(points)
     if moved is points:
         return mesh, False
-    smooth = triangulation(moved)
+    smooth = triangulation(moved, lines)
     if defects(smooth) > FEWER_DEFECTS * defects(mesh):
         return mesh, False
     return smooth, True
