@@ -52,7 +52,7 @@ def _batches(count: int) -> list[IntArray]:
 
 
 def _flat(tree: cKDTree, rows: IntArray, ranks: tuple[int, ...]) -> np.ndarray:
-    """(n, len(ranks)) whether the so many nearest neighbours of points lie along a line."""
+    """(n, len(ranks)) whether the nearest neighbours of a point, that many, lie along a line."""
     near = tree.query(tree.data[rows], ranks[-1] + 1)[1]
     offsets = tree.data[near] - tree.data[rows][:, None]
     moments = np.cumsum(offsets[:, :, :, None] * offsets[:, :, None, :], axis=1)
