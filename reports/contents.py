@@ -154,13 +154,14 @@ def labels(rows: Iterable[ResultRow]) -> dict[tuple[str, str], Label]:
     params = {
         key: {n: v for n, v in by_key[key][0].params.items() if n != "device"} for key in keys
     }
+    submitted = {key: str(params[key].pop("name", "")) for key in keys if key[0] == SUBMITTED}
     found: dict[tuple[str, str], Label] = {}
     for key in keys:
         method = key[0]
         preset = params[key].get("preset")
         name, fixed = DISPLAY.get(f"{method}(preset={preset})", DISPLAY.get(method, (method, "")))
         if method == SUBMITTED:
-            name, fixed = str(params[key].pop("name", method)), "submitted"
+            name, fixed = submitted[key], "submitted maps"
         siblings = [params[other] for other in keys if other[0] == method and other != key]
         differing = [
             entry

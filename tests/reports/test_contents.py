@@ -141,7 +141,7 @@ def test_a_submission_is_called_as_its_author_calls_it(tmp_path):
             writer.cell("a", sheet(), "submitted", {"name": name}, result=flat(sheet()))
     (suite,) = contents(tmp_path)
     assert [(one.name, one.detail, one.short) for one in suite.methods] == [
-        (name, "submitted", name) for name in ("My tool", "My tool 2", "<b>")
+        (name, "submitted maps", name) for name in ("My tool", "My tool 2", "<b>")
     ]
 
 
