@@ -1,8 +1,10 @@
-"""`python -m benchmarks run | score | list | check`: the benchmark's commands."""
+"""`python -m benchmarks`: run, list, check, score, publish and more; `--help` names all."""
 
 from __future__ import annotations
 
+import importlib
 import logging
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -112,7 +114,11 @@ def _seeds(_: click.Context, __: click.Parameter, text: str | None) -> list[int]
     help="GB a cell may hold, and a packed file decode to.  [default: four fifths of the "
     "machine's, / jobs; 0.07 of a file]",
 )
-@click.option("--out", type=click.Path(path_type=Path), default="results", show_default=True)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    help="Folder of the results.  [default: results/SUITE, or results/custom for --cases alone]",
+)
 @click.option(
     "--plugin", "plugins", multiple=True, metavar="FILE.py:Class", help="A method to add."
 )
@@ -123,7 +129,7 @@ def run(
     /,
     suite: str | None,
     cases: list[str] | None,
-    out: Path,
+    out: Path | None,
     *,
     strict: bool,
     **options: Any,
@@ -145,6 +151,7 @@ def run(
         )
     else:
         chosen = suites.suite(suite or SUITE)
+    out = Path("results", chosen.name) if out is None else out
     summary = _shown_run(chosen, out, cases=cases, **options)
     rows = summary.rows
     if cases is None and chosen.cases and len(summary.missing) == len(summary.suite.cases):
@@ -153,7 +160,7 @@ def run(
             "\nThe built-in surfaces run in their place.\n"
         )
         rows = [*rows, *_shown_run(suites.suite("builtin"), out, **options).rows]
-    print(f"results: {out}   report: python -m reports {out}")
+    print(f"results: {out}   report: {shlex.join(['python', '-m', 'reports', str(out)])}")
     if strict and any(row.status in BAD for row in rows):
         ctx.exit(1)
 
@@ -162,10 +169,16 @@ def _shown_run(suite: Suite, out: Path, **options: Any) -> Summary:
     """Run a suite, and show the user how it goes."""
     from benchmarks.commands.display import Display, print_summary
     from benchmarks.running import runner
+    from benchmarks.store import versions
+    from benchmarks.store.results import Store
 
     with Display() as progress:
         summary = runner.run(suite, out, progress=progress, **options)
     print_summary(summary)
+    store = Store(out)
+    for name, counts in versions.versions(store, store.rows()).items():
+        if len(counts) > 1:
+            print(f"{out} holds {name} in several versions: {versions.said(counts)}")
     return summary
 
 
@@ -201,15 +214,23 @@ def check(ctx: click.Context, folder: Path) -> None:
         ctx.exit(1)
 
 
-@main.command(context_settings=ELSEWHERE, add_help_option=False)
-@click.argument("arguments", nargs=-1, type=click.UNPROCESSED)
-@click.pass_context
-def score(ctx: click.Context, arguments: tuple[str, ...]) -> None:
-    """Every metric of an existing UV map."""
-    from benchmarks.commands.score import score as command
+def _elsewhere(module: str, name: str, about: str) -> None:
+    """Add a command whose options its own module reads."""
 
-    with command.make_context(f"{ctx.command_path}", list(arguments), parent=ctx.parent) as inner:
-        command.invoke(inner)
+    @main.command(name, help=about, context_settings=ELSEWHERE, add_help_option=False)
+    @click.argument("arguments", nargs=-1, type=click.UNPROCESSED)
+    @click.pass_context
+    def called(ctx: click.Context, arguments: tuple[str, ...]) -> None:
+        command = getattr(importlib.import_module(f"benchmarks.commands.{module}"), name)
+        with command.make_context(name, list(arguments), parent=ctx.parent) as inner:
+            command.invoke(inner)
+
+
+_elsewhere("score", "score", "Every metric of an existing UV map.")
+_elsewhere("travelling", "publish", "Write a results folder into one sealed archive.")
+_elsewhere("travelling", "merge", "Join results folders and archives.")
+_elsewhere("travelling", "verify", "Compute every metric of an archive anew.")
+_elsewhere("travelling", "submit", "Score maps that any tool has made.")
 
 
 @main.command()

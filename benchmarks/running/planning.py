@@ -26,7 +26,7 @@ from benchmarks.store.rows import (
     identity,
 )
 from parapoint.errors import InputError
-from parapoint.files.reading import faults_of, read_parameterized
+from parapoint.files.reading import faults_of
 from parapoint.parameters import LARGEST_SEED, check_whole
 from parapoint.sources import source_hash
 
@@ -38,8 +38,6 @@ LIMITS = {"timeout": "time_limit", "out_of_memory": "memory_limit"}
 LIMIT_RAISED = 1.01
 """Ratio to the limit of the earlier run beyond which a limit counts as raised. The memory that a
 machine reports varies a little from day to day."""
-
-
 MACHINE_FAILED = "machine failed"
 """Why a cell runs again that has ended through no fault of its method."""
 
@@ -153,9 +151,8 @@ def surfaces(store: Store, cases: Sequence[str]) -> tuple[dict[str, str], dict[s
         hashes[case] = store.add_surface(surface)
         if (exact := models.exact_points(case)) is not None:
             store.add_exact(hashes[case], exact)
-        model = models.info(case)
-        if model and model.has_uv:
-            store.add_reference(hashes[case], read_parameterized(models.path(case))[1])
+        if (reference := models.reference(case)) is not None:
+            store.add_reference(hashes[case], reference)
         if origin:
             known[origin] = hashes[case]
     if known != before:
@@ -232,35 +229,20 @@ def _blanks(
     for case in suite.cases:
         for method in chosen:
             for seed in suite.seeds:
-                counted = threads if method.counts_threads else None
-                row_id = identity(
-                    suite=suite.name,
-                    case=case,
-                    method=method.name,
-                    params=method.params,
-                    seed=seed,
-                    source_hash=method.source_hash,
-                    surface_hash=hashes[case],
-                    threads=counted,
-                )
-                if row_id in seen:
-                    continue
-                seen.add(row_id)
-                yield (
-                    method,
-                    ResultRow(
-                        id=row_id,
-                        suite=suite.name,
-                        case=case,
-                        method=method.name,
-                        params=method.params,
-                        seed=seed,
-                        source_hash=method.source_hash,
-                        surface_hash=hashes[case],
-                        status="skipped",
-                        threads=counted,
-                    ),
-                )
+                of_cell: dict[str, Any] = {
+                    "suite": suite.name,
+                    "case": case,
+                    "method": method.name,
+                    "params": method.params,
+                    "seed": seed,
+                    "source_hash": method.source_hash,
+                    "surface_hash": hashes[case],
+                    "threads": threads if method.counts_threads else None,
+                }
+                row_id = identity(**of_cell)
+                if row_id not in seen:
+                    seen.add(row_id)
+                    yield method, ResultRow(id=row_id, status="skipped", **of_cell)
 
 
 def changed(

@@ -57,11 +57,11 @@ SHARPEST = -0.8
 GLUE = 0.3
 """Least cosine between a triangle's normal and that of a vertex where the front meets itself."""
 TIGHTEST = 1.2
-"""Largest empty ball of a triangle that has a say in the normals, in spacings."""
+"""Triangles with a larger empty ball have no say in the normals; its radius, in spacings."""
 AGAINST = -0.3
 """Least cosine between a triangle along the sheets and any of the three normals at its corners."""
 DISAGREEMENT = 2.0
-"""Such a triangle counts as larger by so many times 1 − its mean cosine with them."""
+"""Such a triangle counts as larger by this many times 1 − its mean cosine with them."""
 THINNEST = 1e-7
 """Least height of a triangle over its longest edge."""
 QUARTER = math.pi / 2
@@ -75,7 +75,7 @@ LONGEST_HOLE = 12
 LONGEST_HOLE_IN_LINES = 6
 """The same in thinned scan lines, whose outermost ring may have few points."""
 HANDLE = 30
-"""A handle counts as so many boundary edges, folds or unused points where fronts are compared."""
+"""Where fronts are compared, a handle counts as this many boundary edges, folds or spare points."""
 
 
 class ReconstructionError(RuntimeError):

@@ -15,13 +15,14 @@ import time
 import igl
 import numpy as np
 
-from parapoint.planar.embedding import FLATTEST, tutte
+from parapoint.planar.embedding import FLATTEST, embedded_in_disk
 from parapoint.planar.scaffold import EXACT, LEAST_GAIN, descended, excess, of_area_one
 from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.surface import FloatArray, Mesh
 
 CLOSE = 5e-4
-"""Excess of energy that is none on the way to the layout, which is no goal of its own."""
+"""Excess of energy below which a map counts as having reached the layout. It is loose, since the
+layout is only a step on the way."""
 AT_LAYOUT = 0.1
 """Excess of energy at which a map has come to the layout, so that it needs no other way there."""
 MOST_ROUNDS = 10
@@ -80,7 +81,7 @@ def _embedded(mesh: Mesh) -> tuple[Mesh, FloatArray]:
     mesh = of_area_one(mesh.vertices, mesh.faces)
     if not mesh.face_areas.min() > FLATTEST:
         raise BijectionError("a face has no area")
-    uv = tutte(mesh)
+    uv = embedded_in_disk(mesh)
     areas = signed_areas(uv, mesh.faces)
     if not (np.isfinite(uv).all() and areas.min() > FLATTEST):
         raise BijectionError("its embedding in the disk has flat triangles")

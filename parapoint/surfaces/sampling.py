@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import logging
-
 import numpy as np
 from scipy import sparse
 from scipy.spatial import ConvexHull, QhullError, cKDTree
@@ -12,26 +10,24 @@ from parapoint.errors import InputError
 from parapoint.surfaces.frame import power_of_two
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, Surface, edge_table
 
-logger = logging.getLogger("parapoint")
-
 FEWEST_POINTS = 100
 """Distinct points that a fit needs."""
 COINCIDENT = 1e-6
 """Points that agree to this, in radii of the surface, count as one."""
 FEWEST_VERTICES = 2_000
+"""A mesh of fewer vertices is coarse: these alone do not show its shape, so points of its faces are
+added."""
 NEAREST = 3
+"""Nearest vertices of each one that are looked at on a mesh of more vertices."""
 FAR = 0.005
-"""A mesh is coarse if it has fewer vertices, or if of the nearest so many of each one more than
-this share are more than two edges off: its vertices alone do not show where parts of it are apart,
-so points of its faces are added. Of 43 models with more vertices the share is at most 0.24 % on 28,
-and 0.8 to 27 % on 15."""
+"""Such a mesh is coarse as well if more than this share of the nearest vertices are more than two
+edges away: then its vertices alone do not show where parts of it are apart. Of 43 models the share
+is at most 0.24 % on 28, and 0.8 to 27 % on 15."""
 CANDIDATES = 6
 """Points from which each one on a face is chosen."""
 PACKED = 0.66
 """Least distance of a point on a face from all others, over the root of the mean area of a point:
 some 1.15 times as many as are asked for would fit."""
-MOST_COMPARED = 1_000_000
-"""Rows of a cloud among which repetitions are counted."""
 
 
 def training_points(surface: Surface, count: int, seed: int) -> FloatArray:
@@ -73,18 +69,6 @@ def without_coincident(cloud: FloatArray) -> FloatArray:
     """(M, 3) the points (N, 3) of a cloud in its frame, without those that coincide with others."""
     _, rows = np.unique(np.round(cloud / COINCIDENT), axis=0, return_index=True)
     return cloud[np.sort(rows)]
-
-
-def rows_left_out(surface: Surface) -> dict[str, object]:
-    """How many rows of a cloud were not finite, and how many repeat others (of a million)."""
-    if isinstance(surface, Mesh):
-        return {"dropped_not_finite": 0, "dropped_duplicates": 0}
-    points = surface.points[:MOST_COMPARED]
-    ordered = points[np.lexsort(points.T)]
-    repeated = int((ordered[1:] == ordered[:-1]).all(axis=1).sum())
-    if repeated:
-        logger.warning("%d of %d points repeat others and count once", repeated, len(points))
-    return {"dropped_not_finite": surface.dropped, "dropped_duplicates": repeated}
 
 
 def _is_coarse(mesh: Mesh) -> bool:

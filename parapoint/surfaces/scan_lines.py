@@ -41,7 +41,8 @@ STILL = 0.98
 OFF = 0.7
 """Largest cosine with the direction of a line at which a neighbour is on another one."""
 LONELY_LINES = 0.5
-"""Share of points that see no line beside their own at which there is no surface to be found."""
+"""Largest share of the points that may see no line beside their own. Beyond it the lines are too
+far apart to show a surface."""
 BATCH = 4_096
 """Points looked at together, which bounds the memory."""
 
@@ -186,7 +187,7 @@ def _batches(count: int) -> list[IntArray]:
 
 
 def _flat(tree: cKDTree, rows: IntArray, ranks: Sequence[int]) -> np.ndarray:
-    """(n, len(ranks)) whether the so many nearest neighbours of points lie along a line."""
+    """(n, len(ranks)) whether the nearest neighbours of a point, that many, lie along a line."""
     near = tree.query(tree.data[rows], ranks[-1] + 1)[1]
     offsets = tree.data[near] - tree.data[rows][:, None]
     moments = np.cumsum(offsets[:, :, :, None] * offsets[:, :, None, :], axis=1)
