@@ -1,4 +1,4 @@
-"""`python -m benchmarks run | score | list | check`: the benchmark's commands."""
+"""`python -m benchmarks`: run, list, check, score, publish and more; `--help` names all."""
 
 from __future__ import annotations
 
@@ -166,10 +166,16 @@ def _shown_run(suite: Suite, out: Path, **options: Any) -> Summary:
     """Run a suite, and show the user how it goes."""
     from benchmarks.commands.display import Display, print_summary
     from benchmarks.running import runner
+    from benchmarks.store import versions
+    from benchmarks.store.results import Store
 
     with Display() as progress:
         summary = runner.run(suite, out, progress=progress, **options)
     print_summary(summary)
+    store = Store(out)
+    for name, counts in versions.versions(store, store.rows()).items():
+        if len(counts) > 1:
+            print(f"{out} holds {name} in several versions: {versions.said(counts)}")
     return summary
 
 
@@ -205,7 +211,18 @@ def check(ctx: click.Context, folder: Path) -> None:
         ctx.exit(1)
 
 
-main.add_lazily("score", "benchmarks.commands.score:score", "Grade and metrics of any UV map.")
+for name, place, summary in (
+    ("score", "score:score", "Grade and metrics of any UV map."),
+    ("publish", "travelling:publish", "Write a results folder into one sealed archive."),
+    ("merge", "travelling:merge", "Join results folders and archives into a new folder."),
+    (
+        "verify",
+        "travelling:verify",
+        "Compute every metric of an archive anew, from its maps, and say what differs.",
+    ),
+    ("submit", "travelling:submit", "Score maps that any tool has made."),
+):
+    main.add_lazily(name, f"benchmarks.commands.{place}", summary)
 
 
 @main.command()
