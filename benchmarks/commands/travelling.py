@@ -53,7 +53,8 @@ class _Told:
 def publish(folder: Path, out: Path | None) -> None:
     """Write a results folder into one sealed archive.
 
-    It holds rows, maps, metrics, environment and hashes. A second time gives the same bytes. Rows of your own files are left out.
+    It holds rows, maps, metrics, environment and hashes. A second time gives the same bytes. Rows
+    of your own files are left out.
     """
     archive = folder.resolve().with_name(f"{folder.resolve().name}.zip") if out is None else out
     found = publishing.publish(folder, archive)
@@ -116,7 +117,8 @@ def verify(ctx: click.Context, archive: Path) -> None:
 def submit(folder: Path, method: str, suite: str, out: Path) -> None:
     """Score maps that any tool has made.
 
-    MAPS holds OBJ files with UVs, named by case. The faces are those of the model, in its order. If one file is not so, all are refused.
+    MAPS holds OBJ files with UVs, named by case. The faces are those of the model, in its order. If
+    one file is not so, all are refused.
     """
     chosen = suites.suite(suite)
     submission = submissions.read(folder, method, chosen)
