@@ -31,7 +31,8 @@ import pooch
 
 from benchmarks.cases.builtin import BUILTIN, sampled
 from parapoint.errors import InputError
-from parapoint.files.reading import FORMATS, read_surface
+from parapoint.files.reading import FORMATS, read_parameterized, read_surface
+from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh, PointCloud, Surface
 
 MIRROR = "PARAPOINT_DATA"
@@ -239,6 +240,16 @@ def exact_points(case: str) -> PointCloud | None:
     return exact if (cloud.points != exact.points).any() else None
 
 
+def reference(case: str) -> Parameterization | None:
+    """The UV map that the model of a case came with; None if it came with none.
+
+    Raises:
+        InputError: as for `load`.
+    """
+    model = info(case)
+    return read_parameterized(path(case))[1] if model and model.has_uv else None
+
+
 def info(case: str) -> Model | None:
     """The entry of a case in the registry; None for a built-in surface or a user's file.
 
@@ -344,6 +355,8 @@ def _downloaded(model: Model) -> Path:
     pooch.get_logger().setLevel("WARNING")
     if host in _unreachable and not file.is_file():
         raise _missing_model(model, file, _unreachable[host])
+    if not file.is_file() and not sys.stderr.isatty():  # a terminal has a bar
+        print(f"downloading {model.name}, {model.size / 1e6:.1f} MB", file=sys.stderr, flush=True)
     try:
         pooch.retrieve(
             model.url,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import shlex
 from collections import Counter
@@ -14,7 +15,8 @@ from typing import Any
 from PIL import Image
 
 from benchmarks.cases.suites import SUITES
-from benchmarks.store.rows import ResultRow
+from benchmarks.running import planning
+from benchmarks.store.rows import SUBMITTED, ResultRow
 from parapoint.errors import InputError
 from parapoint.surfaces.surface import Mesh
 from reports.contents import AREA, FLIPPED, SHEETS, Contents, Label, number, suite_title
@@ -23,7 +25,7 @@ from reports.pictures.figures import Drawn
 from reports.pictures.names import VIEWED, map_file, model_file, slug
 from reports.tables import leaderboard
 from reports.tables.leaderboard import MEASURES, SHOWN, Glance, Winner, definition, page_of, winner
-from reports.tables.notes import load_notes
+from reports.tables.notes import load_notes, version_notes
 from reports.tables.published import published_values
 from reports.tables.table import Table, metric_column
 
@@ -140,9 +142,9 @@ class Section:
         return dict(Counter(row.status.replace("_", " ") for row in self.contents.rows))
 
     @property
-    def load_notes(self) -> list[str]:
-        """Which times are unsure, as the machine was busy."""
-        return load_notes(self.contents)
+    def warnings(self) -> list[str]:
+        """What a reader must know: mixed versions, and times that a busy machine made unsure."""
+        return [*version_notes(self.contents), *load_notes(self.contents)]
 
     @property
     def unfinished(self) -> list[ResultRow]:
@@ -318,15 +320,31 @@ class Section:
         return "The model could not be had."
 
     @property
+    def suite_command(self) -> str:
+        """The command that runs the whole suite; "" for one of the user's own, which has no name.
+
+        As the other commands, it goes on in the folder that the report was made from.
+        """
+        if self.name not in SUITES:
+            return ""
+        return shlex.join(["nox", "-s", "bench", "--", self.name, "--out", str(self.results)])
+
+    @property
+    def results(self) -> Path:
+        """The folder that the report was made from."""
+        return self.report.parent
+
+    @property
     def command(self) -> str:
-        """The command that runs the cells again; a suite of the user's own has no name for it."""
+        """The command that runs the cells again, with the methods unless they are the suite's."""
         seeds = ",".join(str(seed) for seed in sorted({row.seed for row in self.contents.rows}))
         cases = ",".join(self.contents.cases)
-        named = [self.name]
-        if self.name not in SUITES:
-            named = ["--methods", ",".join(map(_spec, self.contents.methods))]
+        named = [self.name] if self.name in SUITES else []
+        ours = [label for label in self.contents.methods if label.method != SUBMITTED]
+        if _methods_of(self.name) != {(label.method, label.params) for label in ours}:
+            named += ["--methods", ",".join(map(_spec, ours))]
         run = ["python", "-m", "benchmarks", "run", *named]
-        return shlex.join([*run, "--cases", cases, "--seeds", seeds])
+        return shlex.join([*run, "--cases", cases, "--seeds", seeds, "--out", str(self.results)])
 
     @property
     def runs(self) -> list[dict[str, str]]:
@@ -341,6 +359,14 @@ class Section:
             for number, entry in enumerate(entries)
             if number in used and isinstance(entry, Mapping)
         ]
+
+
+def _methods_of(suite: str) -> set[tuple[str, str]]:
+    """Name and parameters of each method that a suite names; none for a suite of a user's own."""
+    if suite not in SUITES:
+        return set()
+    _, chosen = planning.choice(SUITES[suite], None, (), None, ())
+    return {(method.name, json.dumps(method.params, sort_keys=True)) for method in chosen}
 
 
 def _spec(label: Label) -> str:
