@@ -13,7 +13,7 @@ from parapoint.method import UnsupportedError
 from parapoint.planar.crossing import crossing_vertices
 from parapoint.planar.descent import Run
 from parapoint.planar.growth import grown
-from parapoint.surfaces.across_seams import learned_seam, unfolded
+from parapoint.surfaces.across_seams import learned_seam
 from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.cutting import cut_along, cut_to_disk, disk_cut, edge_lengths
 from parapoint.surfaces.parameterization import Parameterization
@@ -51,18 +51,6 @@ def test_the_seam_of_a_map_is_found_again_as_a_clean_path(make):
     near = on_cut.copy()
     near[mesh.edges[on_cut[mesh.edges].any(axis=1)]] = True
     assert near[mesh.edges[seam]].mean() > 0.95
-
-
-def test_the_banks_are_unfolded():
-    mesh = builtin.torus(16)
-    uv = torn(mesh, disk_cut(mesh))
-    disk = cut_along(mesh, mesh.edges[learned_seam(mesh, uv)])
-    flat = unfolded(mesh, uv, disk)
-    assert (signed_areas(flat, disk.faces) > 0).mean() > 0.99
-    # No face is drawn across the plane: the longest edge is not much longer than in space.
-    ends = disk.edges
-    ratio = np.linalg.norm(flat[ends[:, 0]] - flat[ends[:, 1]], axis=1) / edge_lengths(disk)
-    assert ratio.max() < 4
 
 
 def test_a_map_without_a_tear_has_no_seam():
