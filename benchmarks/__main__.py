@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -112,7 +113,11 @@ def _seeds(_: click.Context, __: click.Parameter, text: str | None) -> list[int]
     help="GB a cell may hold, and a packed file decode to.  [default: four fifths of the "
     "machine's, / jobs; 0.07 of a file]",
 )
-@click.option("--out", type=click.Path(path_type=Path), default="results", show_default=True)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    help="Folder of the results.  [default: results/SUITE, or results/custom for --cases alone]",
+)
 @click.option(
     "--plugin", "plugins", multiple=True, metavar="FILE.py:Class", help="A method to add."
 )
@@ -123,7 +128,7 @@ def run(
     /,
     suite: str | None,
     cases: list[str] | None,
-    out: Path,
+    out: Path | None,
     *,
     strict: bool,
     **options: Any,
@@ -145,6 +150,7 @@ def run(
         )
     else:
         chosen = suites.suite(suite or SUITE)
+    out = Path("results", chosen.name) if out is None else out
     summary = _shown_run(chosen, out, cases=cases, **options)
     rows = summary.rows
     if cases is None and chosen.cases and len(summary.missing) == len(summary.suite.cases):
@@ -153,7 +159,7 @@ def run(
             "\nThe built-in surfaces run in their place.\n"
         )
         rows = [*rows, *_shown_run(suites.suite("builtin"), out, **options).rows]
-    print(f"results: {out}   report: python -m reports {out}")
+    print(f"results: {out}   report: {shlex.join(['python', '-m', 'reports', str(out)])}")
     if strict and any(row.status in BAD for row in rows):
         ctx.exit(1)
 

@@ -13,9 +13,9 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from parapoint import fitting, saving
+from parapoint import saving
 from parapoint.errors import InputError
-from parapoint.fitting import COMPONENTS, Fitted, Progress, Session, SurfaceMap
+from parapoint.fitting import Fitted, Progress, Session, SurfaceMap
 from parapoint.parameters import (
     LARGEST_SEED,
     LONGEST_SECONDS,
@@ -23,6 +23,8 @@ from parapoint.parameters import (
     check_number,
     check_whole,
 )
+from parapoint.side_by_side import SideBySide, fitted_side_by_side
+from parapoint.surfaces.components import COMPONENTS, parts_of
 from parapoint.surfaces.dimension import checked_dimension
 from parapoint.surfaces.frame import Frame
 from parapoint.surfaces.gridding import gridded
@@ -33,7 +35,7 @@ from parapoint.surfaces.parameterization import (
     TracePoint,
 )
 from parapoint.surfaces.seam_points import seam_points
-from parapoint.surfaces.strays import far_from, unmapped, without_strays
+from parapoint.surfaces.strays import far_from, fitted_rows, unmapped
 from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, PointCloud, Surface
 
 logger = logging.getLogger("parapoint")
@@ -54,7 +56,7 @@ class Estimator(ABC):
     estimator is a `Method` too: `parameterize` fits a copy to a surface and maps it.
 
     Attributes:
-        components: see `parapoint.fitting.COMPONENTS`.
+        components: see `parapoint.surfaces.components.COMPONENTS`.
         seed: of every random draw.
         time_budget: seconds that a fit may take, or None.
         points_: (n, 3) the points that the map was fitted to.
@@ -142,15 +144,11 @@ class Estimator(ABC):
 
     def _fit(self, points: npt.ArrayLike | Surface, session: Session) -> Self:
         self.check()
-        surface, strays = without_strays(surface_of(points))
+        surface, left_out = fitted_rows(points)
         shape = checked_dimension(surface)
-        fitted = fitting.fitted(self.fit_part, surface, self.components, session)
-        fitted.report.update(strays | shape)
-        return self._take(fitted)
-
-    def _take(self, fitted: Fitted) -> Self:
-        """Become the estimator of a fitted value."""
-        self.fitted_ = fitted
+        parts = parts_of(surface, self.components)
+        fitted = fitted_side_by_side(self.fit_part, parts, session)
+        self.fitted_ = dataclasses.replace(fitted, report=fitted.report | left_out | shape)
         return self
 
     @property
@@ -327,7 +325,8 @@ def load(folder: str | Path, *, device: str = "auto") -> Estimator:
         restored = restored_map(facts["map"], held, facts["map_facts"], device)
         frame = Frame(np.array(facts["centre"]), float(facts["scale"]))
         trace = tuple(TracePoint(*row) for row in facts["trace"])
-        return model._take(Fitted(restored, frame, points, trace, dict(facts["report"])))  # noqa: SLF001 (made here)
+        model.fitted_ = Fitted(restored, frame, points, trace, dict(facts["report"]))
+        return model
 
 
 def restored_map(
@@ -348,8 +347,6 @@ def restored_map(
 
         return TrainedMap.restored(arrays, facts, device)
     if kind == "SideBySide":
-        from parapoint.side_by_side import SideBySide
-
         maps, frames = [], []
         for k, of in enumerate(facts["components"]):
             prefix = f"component{k}."
@@ -375,21 +372,3 @@ def coordinates(values: npt.ArrayLike | Surface, columns: int) -> FloatArray:
     if array.ndim != 2 or array.shape[1] != columns or not np.isfinite(array).all():
         raise InputError(f"coordinates must be finite and of shape (n, {columns})")
     return array
-
-
-def surface_of(given: npt.ArrayLike | Surface) -> Surface:
-    """A surface, or the cloud of the finite rows of an array; the number of others is logged.
-
-    Raises:
-        InputError: the array has another shape than (n, 3), or no finite row.
-    """
-    if isinstance(given, Mesh | PointCloud):
-        return given
-    points = np.asarray(given, dtype=np.float64)
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise InputError(f"points must have shape (n, 3), not {points.shape}")
-    finite = np.isfinite(points).all(axis=1)
-    dropped = int((~finite).sum())
-    if dropped:
-        logger.warning("dropped %d of %d points: not finite", dropped, len(points))
-    return PointCloud(points[finite], dropped=dropped)

@@ -1,13 +1,12 @@
-"""The story of a fit: the surface is split where asked, each part is fitted, one value comes back.
+"""What a strategy of fitting is given, what it tells on the way, and what it returns.
 
 Estimators (`parapoint.estimator`) differ in their strategy alone: `ComputedMap` computes the map of
-a part, `ParaPoint` trains it. Both return a `Fitted`.
+a surface, `ParaPoint` trains it. Both return a `Fitted`.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,17 +14,9 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from parapoint.surfaces.components import components
 from parapoint.surfaces.frame import Frame
 from parapoint.surfaces.parameterization import Charted, Parameterization, TracePoint
-from parapoint.surfaces.sampling import rows_left_out
 from parapoint.surfaces.surface import FloatArray, Mesh, Surface
-
-logger = logging.getLogger("parapoint")
-
-COMPONENTS = ("together", "each", "largest")
-"""What the parameter `components` may say: one map of the whole surface, one of each component,
-or one of the largest component alone."""
 
 
 class SurfaceMap(Protocol):
@@ -132,36 +123,4 @@ class Session:
 
 
 Strategy = Callable[[Surface, float, Session], Fitted]
-"""Fits one part of a surface, with its share (0 to 1) of the points and of the time."""
-
-
-def fitted(strategy: Strategy, surface: Surface, parts: str, session: Session) -> Fitted:
-    """The map of a surface, or of its components as COMPONENTS says.
-
-    Raises:
-        InputError: the strategy cannot be fitted to a part.
-    """
-    left_out = rows_left_out(surface)
-    found = [surface] if parts == "together" else components(surface)
-    if len(found) > 1 and parts == "largest":
-        logger.warning("%d components: the largest is fitted", len(found))
-    if parts == "largest" or len(found) == 1:
-        whole = strategy(found[0], 1.0, session)
-    else:
-        logger.warning("%d components: each is fitted", len(found))
-        whole = _each(strategy, found, session)
-    return dataclasses.replace(whole, report=whole.report | left_out)
-
-
-def _each(strategy: Strategy, parts: list[Surface], session: Session) -> Fitted:
-    """The maps of several components, side by side; a part's size decides its share."""
-    from parapoint.side_by_side import side_by_side
-
-    sizes = [len(part.vertices if isinstance(part, Mesh) else part.points) for part in parts]
-    made = []
-    for number, (part, size) in enumerate(zip(parts, sizes, strict=True)):
-        own = session.of_component(number)
-        made.append(strategy(part, size / sum(sizes), own))
-        if own.checkpoint is not None and own.checkpoint.is_dir():
-            own.checkpoint.rmdir()
-    return side_by_side(made)
+"""Finds the map of one part of a surface, with a share (0 to 1) of the points and of the time."""

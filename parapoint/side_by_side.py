@@ -1,4 +1,4 @@
-"""One map of a surface of several components, made of a map of each."""
+"""One map of a surface of several parts, made of a map of each."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from parapoint.fitting import Fitted, SurfaceMap, placed
+from parapoint.fitting import Fitted, Session, Strategy, SurfaceMap, placed
 from parapoint.surfaces.frame import IDENTITY, Frame
 from parapoint.surfaces.parameterization import Charted, Parameterization
-from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
+from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, Surface
 
 GAP = 0.02
 """Distance between neighbouring charts, in widths of the widest."""
@@ -114,6 +114,26 @@ def joined(parts: Sequence[Charted]) -> Charted:
     return Charted(
         Mesh(vertices, np.concatenate(faces)), Parameterization(uv, np.concatenate(corners))
     )
+
+
+def fitted_side_by_side(strategy: Strategy, parts: Sequence[Surface], session: Session) -> Fitted:
+    """The map of one part of a surface, or those of several parts side by side.
+
+    Of the points and the time each part has the share that its size is of all.
+
+    Raises:
+        InputError: the strategy cannot be fitted to a part.
+    """
+    if len(parts) == 1:
+        return strategy(parts[0], 1.0, session)
+    sizes = [len(part.vertices if isinstance(part, Mesh) else part.points) for part in parts]
+    made = []
+    for number, (part, size) in enumerate(zip(parts, sizes, strict=True)):
+        own = session.of_component(number)
+        made.append(strategy(part, size / sum(sizes), own))
+        if own.checkpoint is not None and own.checkpoint.is_dir():
+            own.checkpoint.rmdir()
+    return side_by_side(made)
 
 
 def side_by_side(parts: Sequence[Fitted]) -> Fitted:

@@ -33,9 +33,10 @@ def main(folder: Path, exports: bool, against: tuple[Path, ...]) -> None:
         for page, said in pages.write(folder, against):
             print(f"{page}: {said}")
         return
+    from reports.progress import Shown
     from reports.report import write
 
-    print(write(folder, jobs=cores(), textured=exports))
+    print(write(folder, jobs=cores(), textured=exports, progress=Shown()))
 
 
 if __name__ == "__main__":

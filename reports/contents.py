@@ -15,6 +15,7 @@ from typing import Any
 import pandas as pd
 
 from benchmarks.cases.suites import SUITES
+from benchmarks.metrics.grades import grade_of
 from benchmarks.metrics.table import METRICS
 from benchmarks.store import measuring
 from benchmarks.store.results import Store
@@ -23,7 +24,7 @@ from parapoint.console import LONGEST_MESSAGE, printable
 from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh, PointCloud
-from reports.ranking import TIMES, grade_of, worst
+from reports.ranking import TIMES, worst
 
 ANGLE, AREA = "angle_difference_mean", "area_discrepancy_total"
 FLIPPED, SPANNING = "flipped_fraction", "spanning_fraction"

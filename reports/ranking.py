@@ -8,14 +8,12 @@ Ranks are those of a competition: of two that share the first place the next one
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Literal
 
-from benchmarks.metrics.grades import GRADES, Grade, grade
+from benchmarks.metrics.grades import GRADES, Grade
 from benchmarks.metrics.table import METRICS
 
-FROM_POINTS = frozenset({"parapoint", "computed", "fam", "nuvo", "meshed"})
-"""Methods whose maps are made of points alone, so that a few flips at a face are forgiven."""
 ANGLES_AT_POINTS = frozenset(
     {"local_quasi_conformal_mean", "local_quasi_conformal_mean_without_spanning"}
 )
@@ -75,24 +73,6 @@ def means_may_rank(found: Sequence[str], *, angles: bool) -> bool:
     """Whether the means over maps of these grades are ranked in a column."""
     unfit = sum(not may_rank(one, angles=angles) for one in found)
     return unfit <= MOST_LEFT_OUT * len(found)
-
-
-def grade_of(method: str, values: Mapping[str, object]) -> Grade | None:
-    """The grade of a cell; None where it has no map or lacks a metric that the grade needs.
-
-    Args:
-        method: registry name.
-        values: the cell's metrics by name; those it does not have are missing or nan.
-    """
-    known = {
-        name: float(value)
-        for name, value in values.items()
-        if isinstance(value, int | float) and not math.isnan(value)
-    }
-    try:
-        return grade(known, of_cloud=method in FROM_POINTS)
-    except KeyError:
-        return None
 
 
 def worst(found: Sequence[str]) -> Grade | None:

@@ -12,17 +12,18 @@ from reports.page.sections import Section
 from reports.pictures import drawing as pictures
 from reports.pictures import exports, figures
 from reports.pictures.names import slug
+from reports.progress import QUIET, Progress
 from reports.tables import formats
 from reports.tables import suites as tables
 
 
-def write(folder: Path, *, jobs: int, textured: bool = False) -> Path:
+def write(folder: Path, *, jobs: int, textured: bool = False, progress: Progress = QUIET) -> Path:
     """Write the report on the results in `folder` to `folder`/report; the path of its index.
 
     report/tables/SUITE/*.tex, .md, .csv; report/figures/SUITE/*.pdf, .png, captions.md and
     pictures/; report/index.html, report/models/SUITE/MODEL.html and what they share in
     report/assets/; if `textured`, report/exports/SUITE/MODEL/*.obj, .mtl, .png, .glb. What has
-    not changed is not drawn again.
+    not changed is not drawn again. `progress` hears how it goes.
 
     Raises:
         InputError: the folder is missing, holds no results, or is of a newer version; something
@@ -37,10 +38,10 @@ def write(folder: Path, *, jobs: int, textured: bool = False) -> Path:
         name = slug(suite.suite)
         formats.write([*made, tables.everything(suite)], report / "tables" / name)
         drawn_in = report / "figures" / name
-        faults = pictures.draw(suite, drawn_in / "pictures", jobs)
-        drawn = figures.draw(suite, drawn_in / "pictures", drawn_in, jobs)
+        faults = pictures.draw(suite, drawn_in / "pictures", jobs, progress)
+        drawn = figures.draw(suite, drawn_in / "pictures", drawn_in, jobs, progress)
         if textured:
-            faults += exports.write(suite, report)
+            faults += exports.write(suite, report, progress)
         sections.append(Section(report, suite, made, drawn, faults))
     return page.write(report, folder, sections)
 

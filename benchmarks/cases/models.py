@@ -344,6 +344,8 @@ def _downloaded(model: Model) -> Path:
     pooch.get_logger().setLevel("WARNING")
     if host in _unreachable and not file.is_file():
         raise _missing_model(model, file, _unreachable[host])
+    if not file.is_file() and not sys.stderr.isatty():  # a terminal has a bar
+        print(f"downloading {model.name}, {model.size / 1e6:.1f} MB", file=sys.stderr, flush=True)
     try:
         pooch.retrieve(
             model.url,

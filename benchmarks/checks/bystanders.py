@@ -1,7 +1,7 @@
-"""Random runs of all commands in folders full of a user's files: none of these may change.
+"""Run random commands in folders full of a user's files, none of which may change.
 
-The files have names like those that we write ourselves. A command may refuse, with status 2 and one
-line; it may add files; the one that `--out` names it may replace, and nothing else.
+The files have names like those that our commands write. A command may refuse with status 2 and one
+line, it may add files, and it may replace the file that `--out` names. It may do nothing else.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ NAMES = (
     *("map.mtl", "map.png", "map_.png", "out.png", "preview.png", "map.obj.part", "keys.json"),
     *("map.npz", "texture.png", "captions.md", "index.html"),
 )
-"""Names of files that somebody may have where we write."""
+"""Names of files that a user may have where our commands write."""
 COMMANDS = (
     "parapoint fit {cloud} --out {folder} --points 120",
     "parapoint fit {cloud} --out {folder} --preset paper --points 120 --subset 100 --iterations 2",
@@ -53,18 +53,19 @@ COMMANDS = (
     "reports {results}",
     "benchmarks list cases",
 )
-"""What is run: `parapoint`, or a module, with places for files and folders."""
+"""The commands, of `parapoint` or of a module, with the places of their files in braces."""
 
 
 @dataclass
 class Count:
-    """What came of it.
+    """What the commands did.
 
     Attributes:
-        runs: commands that were run.
-        refused: those of them that ended with status 2.
-        files: files of the user's that were looked at, all runs together.
-        faults: files that were changed or removed, and commands that ended otherwise: a line each.
+        runs: the number of commands that ran.
+        refused: the number of them that ended with status 2.
+        files: the number of the user's files that were compared, over all runs.
+        faults: a line for each file that was changed or removed, and for each command that ended
+            with a status that it may not have.
     """
 
     runs: int
@@ -78,8 +79,8 @@ def undisturbed(folder: Path, *, count: int, seed: int) -> Count:
 
     Args:
         folder: an empty folder.
-        count: how many.
-        seed: of every choice.
+        count: the number of commands.
+        seed: decides every choice.
     """
     draw = random.Random(seed)  # noqa: S311  no secret
     found = Count(0, 0, 0, [])
@@ -130,7 +131,7 @@ def _inputs(folder: Path) -> dict[str, Path]:
 
 
 def _fill(folder: Path, draw: random.Random) -> None:
-    """Put some files of the user's into a folder, none in place of another."""
+    """Put some of the user's files into a folder, without replacing any that is there."""
     for name in draw.sample(NAMES, draw.randrange(3, len(NAMES))):
         path = folder / name
         with contextlib.suppress(FileExistsError, NotADirectoryError):
@@ -140,20 +141,20 @@ def _fill(folder: Path, draw: random.Random) -> None:
 
 
 def _ours(results: Path) -> set[Path]:
-    """The files of a folder of results that a run of ours may add to or write anew."""
+    """The files of a results folder that a run may append to or write anew."""
     names = ("runs.jsonl", "environment.json", "surfaces.json", "metrics.parquet", "lock")
     return {results / name for name in names}
 
 
 def _hashes(folder: Path) -> Iterator[tuple[Path, str]]:
-    """Each file below a folder, and the hash of its content."""
+    """Each file below a folder with the hash of its content."""
     for path in folder.rglob("*"):
         if path.is_file():
             yield path, hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _status(command: str, folder: Path) -> int:
-    """The exit status of a command, run in a folder."""
+    """Run a command in a folder and return its exit status."""
     program, *arguments = command.split()
     code = "from parapoint.cli import main; main()"
     start = ["-c", code] if program == "parapoint" else ["-m", program]

@@ -1,16 +1,21 @@
 """`python -m benchmarks.checks.endurance`: what a run survives, and what the harness costs.
 
-`kills`: a run is killed (kill -9) a thousand times at random instants and taken up again. No row
-that had been reported done is lost, none is damaged, and each table that comes of it is the one of
-a run that was never disturbed.
+`kills` kills a run (kill -9) a thousand times at random instants and resumes it each time. No row
+that was reported as done may be lost, no row may be damaged, and every finished run must have the
+table of a run that was never killed.
 
-`faults`: methods that crash, hang, fork, print and eat memory, among instant ones. Each costs its
-own cell: a row with its reason; the others have the maps of a run in which nothing went wrong.
+`faults` runs methods that crash, hang, fork, print and eat memory among instant methods. Each may
+cost its own cell alone, which gets a row with the reason; all other cells must have the maps of a
+run in which nothing went wrong.
 
-`scale`: runs of an instant method. What the harness costs a cell, whether that grows with the
-number of cells, how large the store becomes, how long a finished run takes to say so.
+`scale` runs an instant method in many cells. It prints what the harness costs a cell, whether this
+grows with the number of cells, how large the store becomes, and how long a finished run takes to
+find that nothing is left to do.
 
-`overhead`: cells of every method. What each takes beside the seconds of the method.
+`overhead` runs cells of every method, and prints what each costs beside the time of its method.
+
+`all` repeats kills, faults and commands among a user's files (`benchmarks.checks.bystanders`) until
+a time is over.
 """
 
 from __future__ import annotations
@@ -43,18 +48,18 @@ from parapoint.testing import irregular_disk
 
 PLUGIN = f"{instant.__file__}:Instant"
 TIMING = ("seconds", "cpu_seconds", "load", "peak_memory_mb", "run")
-"""What differs between two rows of the same cell."""
+"""The fields in which two rows of the same cell may differ."""
 CASES = ("half_cylinder", "saddle@noise=0")
-"""A mesh and a cloud, for methods of either."""
+"""A mesh and a cloud, so that every method has a surface that it can take."""
 BUDGETS = {
     **dict.fromkeys(("parapoint", "fam", "nuvo"), "points=120, subset=100, iterations=2"),
     "unwrap": "points=120",
 }
-"""Parameters of the methods that would take minutes."""
+"""Parameters that make those methods short that would take minutes."""
 
 
 def instant_suite(folder: Path, models: int, methods: int, seeds: int) -> Suite:
-    """A suite of instant methods on small meshes, which are written into `folder`."""
+    """A suite of instant methods on small meshes. Writes the meshes into `folder`."""
     mesh = irregular_disk()
     cases = []
     folder.mkdir(parents=True, exist_ok=True)
@@ -71,13 +76,13 @@ def instant_suite(folder: Path, models: int, methods: int, seeds: int) -> Suite:
 
 @dataclass
 class Toll:
-    """What came of the kills.
+    """What the kills cost.
 
     Attributes:
         kills: how often a run was killed.
-        tables: runs that came to their end, all of whose kills were survived.
-        reported: rows that were reported done before a kill.
-        faults: what was lost, damaged or different: one line each.
+        tables: the number of runs that came to their end after their kills.
+        reported: the number of rows that were reported as done before a kill.
+        faults: how often something was lost, damaged or different.
     """
 
     kills: int = 0
@@ -86,16 +91,16 @@ class Toll:
     faults: int = 0
 
     def fault(self, text: str) -> None:
-        """Count and say a fault."""
+        """Count a fault and print it."""
         self.faults += 1
         print(text, flush=True)
 
 
 def toll(suite: Suite, folder: Path, *, count: int, seed: int) -> Toll:
-    """Kill runs of `suite` at `count` instants, anywhere within the time that a whole run takes.
+    """Kill runs of `suite` at `count` random instants within the time that a whole run takes.
 
-    Every time it comes to its end its table is compared with that of a run that was left alone,
-    and it begins anew in another folder.
+    A run that is killed is resumed. When it comes to its end, its table is compared with the table
+    of a run that was never killed, and another run begins in a new folder.
     """
     draw = random.Random(seed)  # noqa: S311  no secret
     found = Toll()
@@ -120,20 +125,20 @@ def toll(suite: Suite, folder: Path, *, count: int, seed: int) -> Toll:
 
 
 class _Report(runner.Progress):
-    """Reports each row as it is done, through a pipe: what went in is there after a kill."""
+    """Reports each finished row through a pipe: what was written to it survives a kill."""
 
     def __init__(self, pipe: int) -> None:
         self.pipe = pipe
 
     def ended(self, cell: planning.Cell, row: Any) -> None:  # noqa: ARG002  as its base
-        """Send the row's id, in one write."""
+        """Send the id of the row in one write."""
         os.write(self.pipe, f"{row.id}\n".encode())
 
 
 def _killed(suite: Suite, out: Path, delay: float, reported: set[str]) -> bool:
-    """Run `suite` in a process that is killed after `delay` s; False where it had ended by then.
+    """Run `suite` in a process that is killed after `delay` s; False if it had ended by then.
 
-    The process is a fork of this one, which has the imports behind it: kills go into the run.
+    The process is a fork of this one, where all imports are done, so that the kill hits the run.
     Ids of rows that it reports are added to `reported`.
     """
     receive, send = os.pipe()
@@ -157,7 +162,7 @@ def _killed(suite: Suite, out: Path, delay: float, reported: set[str]) -> bool:
 
 
 def _check(store: Store, reported: set[str], found: Toll) -> None:
-    """All that was reported is there and whole; no more than the last line is torn."""
+    """Check that every reported row is there and whole, and that at most the last line is torn."""
     missing = reported - {row.id for row in store.history()}
     if missing:
         found.fault(f"{store.folder.name}: {len(missing)} rows that were reported are gone")
@@ -166,7 +171,7 @@ def _check(store: Store, reported: set[str], found: Toll) -> None:
 
 
 def _table(store: Store) -> list[dict[str, Any]]:
-    """Rows and metrics of a run, by cell, without what takes time."""
+    """The rows and metrics of a run in the order of their cells, without TIMING."""
     frame = measuring.metrics(store).set_index("id").drop(columns="metrics_key")
     metrics = {str(key): repr(value) for key, value in frame.to_dict("index").items()}
     rows = sorted(store.rows(), key=lambda row: row.cell)
@@ -178,14 +183,14 @@ def _table(store: Store) -> list[dict[str, Any]]:
 
 
 def saved(models: Path, out: Path, seeds: int) -> Toll:
-    """Run methods that go wrong among instant ones: each costs its own cell, and nothing else."""
+    """Run methods that go wrong among instant ones; each may cost its own cell alone."""
     instants = instant_suite(models, models=2, methods=2, seeds=seeds)
     wrong = tuple(f"faulty(fault={fault})" for fault in faulty.FAULTS)
     mixed = dataclasses.replace(instants, methods=(*wrong, *instants.methods))
     found = Toll()
     runner.run(instants, out / "alone", plugins=[PLUGIN])
     plugins = [PLUGIN, f"{faulty.__file__}:Faulty"]
-    # One at a time: some do away with the folders of all cells that are at work.
+    # One cell at a time, since some methods remove the folders of all cells that are running.
     runner.run(mixed, out / "mixed", plugins=plugins, timeout=8.0, memory=0.5)
     store = Store(out / "mixed")
     for fault in verifying.faults(store):
@@ -203,7 +208,7 @@ def saved(models: Path, out: Path, seeds: int) -> Toll:
     elsewhere = out / "mixed" / faulty.ELSEWHERE
     if elsewhere.exists() and (elsewhere / "map.npz").read_text() != faulty.OTHERS:
         found.fault("a file outside the cell's folder was changed")
-    for process in psutil.process_iter(["cwd"]):  # by where it is: its parent may be gone
+    for process in psutil.process_iter(["cwd"]):  # known by its folder: its parent may be gone
         if (process.info["cwd"] or "").startswith(str(out.resolve())):
             found.fault(f"process {process.pid} is left")
     return found
@@ -237,7 +242,7 @@ def kills(ctx: click.Context, count: int, seed: int) -> None:
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @click.pass_context
 def all_(ctx: click.Context, minutes: float, seed: int) -> None:
-    """All of it in turn, until the time is over: kills, faults, commands among a user's files."""
+    """Kill runs, let methods go wrong, run commands among a user's files, until time is over."""
     end = time.monotonic() + 60 * minutes
     rounds = total = 0
     while time.monotonic() < end:
@@ -266,7 +271,7 @@ def all_(ctx: click.Context, minutes: float, seed: int) -> None:
 @click.option("--seeds", type=click.IntRange(1), default=20, show_default=True)
 @click.pass_context
 def faults(ctx: click.Context, seeds: int) -> None:
-    """Let methods crash, hang, fork and eat memory, and see what that costs the others."""
+    """Let methods crash, hang, fork and eat memory, and count what that costs other cells."""
     with tempfile.TemporaryDirectory() as name:
         found = saved(Path(name) / "models", Path(name), seeds)
     print(f"{found.reported} cells: {found.faults or 'no'} faults")
@@ -281,7 +286,7 @@ def faults(ctx: click.Context, seeds: int) -> None:
 @click.option("--jobs", type=click.IntRange(1), default=2, show_default=True)
 @click.option("--out", type=click.Path(path_type=Path), default=Path("results/scale"))
 def scale(models: int, methods: int, seeds: int, jobs: int, out: Path) -> None:
-    """Run instant methods, and say what the harness costs; a run that was stopped goes on."""
+    """Run instant methods, and print what the harness costs; a stopped run is resumed."""
     suite = instant_suite(out / "models", models, methods, seeds)
     store = out / "store"
     for title in ("run", "run again"):
@@ -302,7 +307,7 @@ def scale(models: int, methods: int, seeds: int, jobs: int, out: Path) -> None:
 @main.command()
 @click.option("--cells", type=click.IntRange(1), default=5, show_default=True)
 def overhead(cells: int) -> None:
-    """Run CELLS cells of every method on a mesh and on a cloud: what the harness adds to each."""
+    """Run CELLS cells of every method on a mesh and a cloud, and print what the harness adds."""
     clock = _Clock()
     specs = [f"{name}({BUDGETS.get(name, '')})" for name in registry.METHODS if name != "external"]
     suite = Suite("overhead", "Small cells of every method", CASES, (*specs,), (*range(cells),))
@@ -314,7 +319,7 @@ def overhead(cells: int) -> None:
 
 
 class _Clock(runner.Progress):
-    """Seconds that each cell that is ok took beside its method, by method."""
+    """By method, the seconds that each cell with a map took beside its method."""
 
     def __init__(self) -> None:
         self.began = 0.0
@@ -325,14 +330,14 @@ class _Clock(runner.Progress):
         self.began = time.monotonic()
 
     def ended(self, cell: planning.Cell, row: Any) -> None:  # noqa: ARG002  as its base
-        """Note the time since, but for that of the method."""
+        """Note the time since then, without that of the method."""
         if row.status == "ok":
             added = time.monotonic() - self.began - row.seconds
             self.added.setdefault(row.method, []).append(added)
 
 
 def _processor_seconds() -> float:
-    """Processor time of this process and of those that it has waited for."""
+    """Processor seconds of this process and of the children that it has waited for."""
     return sum(os.times()[:4])
 
 

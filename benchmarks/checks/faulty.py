@@ -1,4 +1,4 @@
-"""A method that goes wrong in a given way: what is left of a run is what the harness saves."""
+"""A method that goes wrong in a chosen way, to see what the harness saves of the run."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh, Surface
 
 ELSEWHERE, OTHERS = "elsewhere", "a user's file"
-"""A folder that is no cell's, and the content of the file map.npz in it."""
+"""A folder that belongs to no cell, and the content of the file map.npz in it."""
 
 
 def _eat() -> Never:
@@ -59,7 +59,7 @@ def _babble() -> None:
 
 
 def _scatter() -> None:
-    """Daemons in sessions of their own, one of another program without our variables."""
+    """Leave two daemons in sessions of their own: this program, and one without its environment."""
     for program in (False, True):
         if os.fork():
             continue
@@ -92,7 +92,7 @@ def _few_descriptors() -> None:
 
 
 def _at_the_end(harm: Callable[[Path], object]) -> None:
-    """Do harm to the cell's folder once its map is written and its outcome is told."""
+    """Harm the folder of the cell once its map is written and its outcome is reported."""
     end, folder = os._exit, Path.cwd().parent
 
     def ended(status: int) -> Never:
@@ -121,17 +121,17 @@ def _folder_for_a_map(folder: Path) -> None:
 
 
 def _pipes(of: int) -> list[Path]:
-    """The pipes that a process holds."""
+    """The pipes that a process has open."""
     held = []
     for path in Path(f"/proc/{of}/fd").iterdir():
-        with contextlib.suppress(OSError):  # the descriptor of the look itself
+        with contextlib.suppress(OSError):  # the listing has a descriptor that is gone by now
             if str(path.readlink()).startswith("pipe:"):
                 held.append(path)
     return held
 
 
 def _say(line: bytes, of: int) -> None:
-    """Write into every pipe that a process holds and that takes it at once."""
+    """Write a line into every pipe of a process that takes it without waiting."""
     for path in _pipes(of):
         with contextlib.suppress(OSError):
             writing = os.open(path, os.O_WRONLY | os.O_NONBLOCK)
@@ -140,7 +140,7 @@ def _say(line: bytes, of: int) -> None:
 
 
 def _lie() -> None:
-    """Tell all pipes, the supervisor's too, that this cell has ended well, and go wrong."""
+    """Report through every pipe, also those of the supervisor, that this cell is ok; then fail."""
     fields = {"status": "ok", "uv_sha256": "0" * 64, "seconds": 1e-9}
     line = json.dumps(["Outcome", fields]).encode() + b"\n"
     _say(line, os.getpid())
@@ -195,15 +195,15 @@ FAULTS: dict[str, tuple[Callable[[], object], str]] = {
     "eat": (_eat, "out_of_memory"),
     "sleep": (_sleep, "timeout"),
 }
-"""What goes wrong, and the status of the row that comes of it."""
+"""By name, what the method does, and the status that its row must have."""
 
 
 @dataclass(frozen=True)
 class Faulty:
-    """Does not come back.
+    """A method that goes wrong.
 
     Attributes:
-        fault: one of FAULTS.
+        fault: how; one of FAULTS.
     """
 
     fault: str = "segfault"

@@ -1,10 +1,10 @@
-"""`python -m benchmarks.checks.fuzzing TARGET`: bytes that no program wrote, into every reader.
+"""`python -m benchmarks.checks.fuzzing TARGET`: feed every reader with bytes that no program wrote.
 
-A target takes bytes as a file's content. It may return or raise InputError; anything else, a
-second of processor time or 200 megabytes for up to a million bytes is a finding (`score` measures
-what it reads, and may take longer). atheris (libFuzzer) changes the seeds guided by the branches of
-the Python code that they reach, and keeps what made a finding; the tests do a short, unguided form
-of the same.
+A target takes bytes as the content of a file. It may return, or raise InputError. Any other
+exception is a finding, and so is an input of up to a million bytes that takes more than a second of
+processor time or 200 megabytes (`score` measures what it reads, and may take more). atheris
+(libFuzzer) changes valid files, guided by the branches of the Python code that they reach, and keeps
+each input that made a finding. The tests do the same for a short time, without guidance.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ from parapoint.errors import InputError
 from parapoint.files.reading import FORMATS, UV_FORMATS
 
 LONGEST = 4096
-"""Bytes of an input, at most."""
+"""Longest input that atheris makes, in bytes."""
 SECONDS = 1.0
-"""Processor time that one input of up to a million bytes may take."""
+"""Processor time that an input of up to a million bytes may take, in seconds."""
 MEGABYTES = 200
-"""By how much one process may grow, whatever it is fed."""
+"""Memory by which a process may grow, whatever it is fed, in units of 10^6 bytes."""
 SCORE_SECONDS, SCORE_MEGABYTES = 20.0, 600
 """The same for `score`, which measures up to 250,000 faces that lie on one another."""
 TABLES = ("runs.jsonl", "environment.json", "surfaces.json", "metrics.parquet")
 STORE_FILES = (*TABLES, "uv", "surface")
-"""Parts of a results folder; the first byte of an input to `store` says which it replaces."""
+"""Parts of a results folder. The first byte of an input to `store` says which one it replaces."""
 
 
 class Finding(Exception):  # noqa: N818  not an error of this program
@@ -77,7 +77,7 @@ def score(data: bytes) -> None:
 
 
 def store(data: bytes) -> None:
-    """Read and check a results folder one file of which is `data` but for its first byte."""
+    """Read and check a results folder in which `data`, without its first byte, replaces a file."""
     from benchmarks.store import measuring, verifying
     from benchmarks.store.results import Store
 
@@ -97,12 +97,12 @@ def store(data: bytes) -> None:
                 results.rows()
     finally:
         path.write_bytes(before)
-        if name != "runs.jsonl":  # what was torn of it has been set aside
+        if name != "runs.jsonl":  # whose torn lines have been set aside
             (folder / "runs.torn").unlink(missing_ok=True)
 
 
 def model(data: bytes) -> None:
-    """Load a saved model one file of which is `data` but for its first byte."""
+    """Load a saved model in which `data`, without its first byte, replaces a file."""
     from parapoint.estimator import load
 
     files = sorted(_model().iterdir())
@@ -134,21 +134,21 @@ TARGETS: dict[str, Callable[[bytes], None]] = {
     "store": store,
     "model": model,
 }
-"""What takes bytes, by name: a reader for each ending, `score`, a results folder, a saved model."""
+"""The targets by name: the reader of each ending, `score`, a results folder, a saved model."""
 HOSTILE = (
     *(b"", b"-1", b"0", b"1e999", b"nan", b"999999999999", b"\xff" * 4, b"\x7f" * 8, b"\n" * 3),
     *(struct.pack("<I", 2**31), struct.pack("<Q", 10**12), b"../../etc/passwd"),
 )
-"""What is put into files."""
+"""Pieces that are put into files: numbers and bytes that readers may not expect."""
 LARGE = 1_000_000
-"""Bytes of the files that grow by repetition."""
+"""Size to which some files grow by repetition, in bytes."""
 
 
 def guarded(target: Callable[[bytes], None], data: bytes) -> None:
     """Give `data` to `target`.
 
     Raises:
-        Finding: it took too long, or the process has become too large.
+        Finding: it took too long, or the process has grown too large.
         Exception: whatever the target raises.
     """
     began = time.process_time()
@@ -170,13 +170,13 @@ def _peak_megabytes() -> float:
 
 @functools.cache
 def _first_megabytes() -> float:
-    """Peak resident memory before the first input was done, its imports included."""
+    """Peak resident memory of this process when this was first asked, before the first input."""
     return _peak_megabytes()
 
 
 @functools.cache
 def _scratch() -> Path:
-    """A folder for the files of this process, in memory where the system has such a place."""
+    """A folder for the files of this process, in memory where the system allows."""
     shared = Path("/dev/shm")  # noqa: S108  the folder made in it is private
     folder = tempfile.TemporaryDirectory(dir=shared if shared.is_dir() else None)
     _kept.append(folder)
@@ -184,12 +184,12 @@ def _scratch() -> Path:
 
 
 _kept: list[tempfile.TemporaryDirectory[str]] = []
-"""Folders that go with the process."""
+"""Folders that are removed when the process ends."""
 
 
 @functools.cache
 def _results() -> tuple[Path, str, str]:
-    """A results folder with one cell; the ids of its row and of its surface."""
+    """A results folder with one cell, the id of its row, and the hash of its surface."""
     from benchmarks.cases.suites import Suite
     from benchmarks.checks import instant
     from benchmarks.running import runner
@@ -205,7 +205,7 @@ def _results() -> tuple[Path, str, str]:
 
 
 def _functions(*packages: str) -> Iterator[types.FunctionType]:
-    """The functions and methods of these packages' modules, as far as they are imported."""
+    """The functions and methods of all modules of these packages that are imported."""
     for name, module in list(sys.modules.items()):
         if any(f"{name}.".startswith(f"{package}.") for package in packages):
             for value in list(vars(module).values()):
@@ -216,7 +216,7 @@ def _functions(*packages: str) -> Iterator[types.FunctionType]:
 
 
 def seeds(target: str) -> list[bytes]:
-    """Small inputs that are right, from which the fuzzer starts."""
+    """Small valid inputs, with which the fuzzer starts."""
     if target == "model":
         files = sorted(_model().iterdir())
         return [bytes([n]) + path.read_bytes() for n, path in enumerate(files)]
@@ -228,7 +228,7 @@ def seeds(target: str) -> list[bytes]:
 
 
 def _file_seeds() -> dict[str, list[bytes]]:
-    """A square in two triangles, as every format that has a seed of its own."""
+    """A square of two triangles in every format, by ending."""
     import laspy
     import trimesh
 
@@ -281,13 +281,13 @@ def _file_seeds() -> dict[str, list[bytes]]:
 
 
 def _exported(mesh: Any, kind: str) -> bytes:
-    """A file of a trimesh mesh."""
+    """The content of a file that trimesh writes of a mesh."""
     content = mesh.export(file_type=kind)
     return content.encode() if isinstance(content, str) else bytes(content)
 
 
 def changed(data: bytes, draw: random.Random) -> bytes:
-    """`data` with bytes at up to four places replaced, or cut, or grown to a million bytes."""
+    """`data` with bytes replaced at up to four places; some of it repeated to a million bytes."""
     for _ in range(draw.randrange(1, 5)):
         at = draw.randrange(len(data) + 1)
         piece = draw.choice([*HOSTILE, draw.randbytes(draw.randrange(1, 9))])
@@ -300,7 +300,7 @@ def changed(data: bytes, draw: random.Random) -> bytes:
 
 
 def unguided(minutes: float, seed: int) -> int:
-    """Feed all targets in turn with changed seeds until the time is over; how many findings."""
+    """Feed all targets in turn with changed seeds until time is over; the number of findings."""
     draw = random.Random(seed)  # noqa: S311  no secret
     given = {name: seeds(name) for name in TARGETS}
     _first_megabytes()
@@ -313,7 +313,7 @@ def unguided(minutes: float, seed: int) -> int:
             began = time.process_time()
             try:
                 guarded(target, data)
-            except Exception as error:  # noqa: BLE001  whatever it is, it is a finding
+            except Exception as error:  # noqa: BLE001  every exception is a finding
                 findings += 1
                 kept = Path(tempfile.mkdtemp()) / f"finding.{name}"
                 kept.write_bytes(data)

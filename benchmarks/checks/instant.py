@@ -1,4 +1,4 @@
-"""A method that takes no time: what is left of a run is the harness."""
+"""A method that takes no time, so that all the time of a run is that of the harness."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from parapoint.surfaces.surface import Mesh, Surface
 
 @dataclass(frozen=True)
 class Instant:
-    """Orthogonal projection along z, scaled.
+    """The orthogonal projection along z, scaled.
 
     Attributes:
-        variant: as many methods as are wanted differ by it.
+        variant: a number by which methods differ, so that a run can have any number of them.
     """
 
     variant: int = 0
@@ -22,7 +22,7 @@ class Instant:
     requires: ClassVar[frozenset[str]] = frozenset({"faces"})
 
     def parameterize(self, surface: Surface, *, seed: int) -> Parameterization:
-        """The first two coordinates, scaled by what sets one cell apart from another."""
+        """The first two coordinates, with a scale of its own for each variant and seed."""
         assert isinstance(surface, Mesh)
         scale = 1 + self.variant + seed / 10
         return Parameterization(surface.vertices[:, :2] * scale, surface.faces)

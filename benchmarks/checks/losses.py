@@ -1,9 +1,9 @@
-"""Golden losses: the first steps of each training, which every later one follows from.
+"""Golden losses: the first steps of each training, on which all later steps depend.
 
     tests/golden/trained/losses_<run>.csv      step, total and terms of the objective
 
-`python -m benchmarks.checks.losses` rewrites them, for a commit that changes the training on
-purpose and says by how much.
+`python -m benchmarks.checks.losses` rewrites them. A commit that does so changes the training on
+purpose, and says by how much the losses move.
 """
 
 from __future__ import annotations
@@ -16,22 +16,24 @@ from benchmarks.cases import models
 from benchmarks.checks.regress import TRAINED, read_rows
 
 MODEL = "hand_1_i_f5000"
+"""The model that is trained on."""
 STEPS = 20
+"""Steps of each training."""
 _SMALL = f"points=200, subset=128, iterations={STEPS}, device=cpu, threads=1"
 RUNS = {
     "paper": f"parapoint(preset=paper, {_SMALL})",
     "paper_adamw": f"parapoint(preset=paper, optimizer=adamw, {_SMALL})",
     "learned": f"parapoint(preset=learned, {_SMALL})",
 }
-"""Runs by name, as specs: every preset, and the paper's once more with the plainer optimiser, which
-rounding leads astray later."""
+"""The specs of the runs by name: each preset, and the paper's once more with AdamW. Rounding makes
+two runs drift apart; with AdamW it takes more steps until this shows."""
 
 Losses = list[dict[str, float]]
-"""Total and terms at each step."""
+"""For each step the total of the objective and its terms, by name."""
 
 
 def first_losses(run: str) -> Losses:
-    """The losses of a run's steps.
+    """Train anew, and return the losses of a run.
 
     Raises:
         MissingModelError: the model is not at hand.
@@ -41,7 +43,7 @@ def first_losses(run: str) -> Losses:
 
 
 def golden_losses(run: str) -> Losses:
-    """The losses that the run had."""
+    """The losses that are on file for a run."""
     return [
         {name: float(value) for name, value in row.items() if name != "step"}
         for row in read_rows(_path(run))
@@ -49,7 +51,7 @@ def golden_losses(run: str) -> Losses:
 
 
 def write_losses(run: str, found: Losses) -> None:
-    """Make these losses the golden ones."""
+    """Put these losses on file."""
     with _path(run).open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["step", *found[0]])

@@ -1,17 +1,18 @@
 """`nox -s regress`: have the metric values of the methods moved?
 
-Deterministic methods run, and the metrics of their maps are compared with golden values, in three
-comparisons: of solvers on the `core` suite, of computed maps and of trained maps on a few models.
+It runs methods that give the same map each time, and compares the metrics of their maps with golden
+values. There are three comparisons: solvers on the suite `core`, and computed and trained maps on a
+few models.
 
     tests/golden/solvers/<method>.csv      case, status, metrics; one file a method
     tests/golden/solvers/tolerances.csv    relative and absolute tolerance of each metric, and why
-    tests/golden/computed/...              the same for what is cut and flattened by this project
-    tests/golden/trained/...               the same for networks
-    tests/golden/figures.csv               single values that are known, with tolerance and reason
+    tests/golden/computed/...              the same for the computed map and for `unwrap`
+    tests/golden/trained/...               the same for the networks
+    tests/golden/figures.csv               single known values, with tolerance and reason
 
-Cells are kept in results/regress and run again where the method's source, the surface or the
-environment changed; metrics are computed anew where their source changed. A change that is meant
-to move values rewrites them with --update, and its commit says by how much they moved.
+Cells are kept in results/regress. A cell runs again where the source of its method, its surface or
+the environment has changed, and is measured again where the source of a metric has. A change that
+is meant to move values rewrites them with --update, and its commit says by how much they moved.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ from parapoint.errors import InputError
 GOLDEN = Path(__file__).parents[2] / "tests" / "golden"
 RESULTS = Path("results") / "regress"
 DIGITS = 9
+"""Significant digits of a golden value."""
 
 
 @dataclass(frozen=True)
@@ -44,10 +46,10 @@ class Comparison:
     """Methods, cases and metrics that are compared.
 
     Attributes:
-        name: of the folder of golden values.
-        methods: specs of methods that give the same map each time.
-        cases: models.
-        metrics: what is compared.
+        name: the name of the folder of golden values.
+        methods: the specs of methods that give the same map each time.
+        cases: the models.
+        metrics: the names of the metrics.
     """
 
     name: str
@@ -82,7 +84,7 @@ SOLVERS = Comparison(
 )
 """Every baseline that gives the same map each time and installs with the benchmark.
 
-Without spanning faces these maps, most of them injective, read the same.
+Metrics without spanning faces are left out: most of these maps are one to one and have none.
 """
 QUALITY = (
     "angle_difference_mean_without_spanning",
@@ -106,8 +108,8 @@ QUALITY = (
     "uv_collision_fraction",
     "spanning_point_fraction",
 )
-"""What tells how good a map is, of a mesh and of a cloud: angles, areas, the worst part, flips,
-overlaps, seams."""
+"""The metrics that show how good a map of a mesh or of a cloud is: angles, areas, the worst part,
+flips, overlaps, seams."""
 COMPUTED = Comparison(
     "computed",
     ("computed(points=4000)", "computed", "unwrap(points=2000)"),
@@ -123,9 +125,10 @@ COMPUTED = Comparison(
     ),
     QUALITY,
 )
-"""Disks, a slit cylinder, closed surfaces of genus 0, 4 and 2, a scan, a noisy cloud.
+"""Disks, a slit cylinder, closed surfaces of genus 0, 4 and 2, a scan and a noisy cloud.
 
-On these the seam stays where it is when the vertices move by 1e-14 to 1e-12 of their coordinates.
+On these models the seam does not move when the vertices move by 1e-14 to 1e-12 of their
+coordinates, so that rounding on another machine does not move it either.
 """
 TRAINED = Comparison(
     "trained",
@@ -136,13 +139,13 @@ TRAINED = Comparison(
     ("hand_1_i_f5000", "max_planck_i_f8000"),
     QUALITY,
 )
-"""Short runs of each preset; `benchmarks.checks.losses` holds their first steps tightly."""
+"""Short runs of each preset. `benchmarks.checks.losses` compares their first steps more closely."""
 COMPARISONS = (SOLVERS, COMPUTED, TRAINED)
 
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How far a metric may move unnoticed: relative + absolute * golden value, and why so far."""
+    """How far a metric may move: by absolute + relative * golden value; and why so far."""
 
     relative: float
     absolute: float
@@ -151,14 +154,14 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Move:
-    """A value that is not the golden one.
+    """A value that differs from its golden one.
 
     Attributes:
-        method: file of golden values.
-        case: model.
-        metric: which value; "status" for how the cell ended.
-        golden: the value in the file, as text; "" for none.
-        now: the value found, as text; "" for none.
+        method: the name of the method's file of golden values.
+        case: the model.
+        metric: the metric; "status" for how the cell ended.
+        golden: the value on file, as text; "" for none.
+        now: the value that was found, as text; "" for none.
         excess: the change in units of the tolerance; infinite where there is no number.
     """
 
@@ -171,11 +174,11 @@ class Move:
 
 
 Rows = dict[str, dict[str, str]]
-"""Values of a method: case -> column -> text."""
+"""The values of a method as text, by case and column."""
 
 
 def file_name(spec: str) -> str:
-    """A method's spec as the name of its file, without the ending."""
+    """The name of the file of a method, made of its spec, without the ending."""
     words = re.findall(r"[\w.]+", re.sub(r"\w+=", "", spec))
     return "_".join(words)
 
@@ -230,7 +233,7 @@ def text(value: float) -> str:
 
 
 def moves(spec: str, golden: Rows, now: Rows, allowed: Mapping[str, Tolerance]) -> list[Move]:
-    """What moved by more than its tolerance; a cell that is new, gone or ends otherwise is one."""
+    """The values that moved by more than their tolerance, and the cells that end otherwise now."""
     found = []
     for case in dict.fromkeys([*golden, *now]):
         before, after = golden.get(case, {}), now.get(case, {})
@@ -247,7 +250,7 @@ def moves(spec: str, golden: Rows, now: Rows, allowed: Mapping[str, Tolerance]) 
 
 
 def change(old: str, new: str, relative: float, absolute: float) -> float:
-    """The change in units of the tolerance: 0 for equal texts, infinite if one is no number."""
+    """The change in units of the tolerance: 0 for equal texts, inf where one is not a number."""
     if old == new:
         return 0.0
     try:
@@ -266,7 +269,7 @@ def cell(status: str, values: Mapping[str, float]) -> dict[str, str]:
 
 
 def measured(suite: Suite) -> dict[str, Rows]:
-    """Values of all cells of a suite by method spec; cases whose model is missing are left out."""
+    """The values of all cells of a suite, by spec of the method; missing models are left out."""
     from benchmarks.commands.display import Display, print_summary
     from benchmarks.running import environment, runner
     from benchmarks.store import measuring
@@ -291,7 +294,7 @@ def figures(folder: Path = GOLDEN) -> list[dict[str, str]]:
 
 
 def missed_figures(rows: Iterable[Mapping[str, str]], now: Mapping[str, Rows]) -> list[Move]:
-    """The known figures that are not met; those whose model is missing are left out."""
+    """The known figures that are missed; those of missing models are left out."""
     found = []
     for row in rows:
         values = now.get(row["method"], {}).get(row["case"])
@@ -305,7 +308,7 @@ def missed_figures(rows: Iterable[Mapping[str, str]], now: Mapping[str, Rows]) -
 
 
 def table(found: Sequence[Move]) -> Table:
-    """What moved, by how much, the farthest first."""
+    """What moved and by how much; what moved most comes first."""
     shown = Table(title=f"{len(found)} values moved", title_justify="left")
     for heading in ("method", "case", "metric"):
         shown.add_column(heading)
@@ -358,7 +361,7 @@ def main(ctx: click.Context, /, *, update: bool) -> None:
 
 
 def _other_cells(now: Mapping[str, Rows]) -> dict[str, Rows]:
-    """The values of the methods that known figures need and the comparison does not run."""
+    """The values of methods that known figures need, where no comparison has run them."""
     wanted: dict[str, Any] = {}
     for row in figures():
         if row["method"] not in now:

@@ -1,8 +1,8 @@
-"""ParaPoint as it is written down at once, and the race of `parapoint` against it.
+"""The straightforward way to write ParaPoint, and a race of `parapoint` against it.
 
-Plain torch layers, Jacobians by `torch.autograd.grad` with a graph (so the loss on them goes
-backward twice), neighbours by all distances, all 10,000 points in every iteration. The losses,
-weights and learning rate are those of the paper preset.
+It has plain torch layers, Jacobians by `torch.autograd.grad` with a graph (so that the gradient of
+the losses on them differentiates twice), neighbours from the matrix of all distances, and all
+10,000 points in every step. Losses, weights and learning rate are those of the preset `paper`.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ if TYPE_CHECKING:
 
 
 class Reached(NamedTuple):
-    """What a way to the map had reached.
+    """What one way to a map had reached at some time.
 
     Attributes:
-        what: the way.
-        iterations: steps of training.
-        cpu_seconds: processor time, all threads together.
+        what: the name of the way.
+        iterations: the number of training steps.
+        cpu_seconds: processor time in seconds, all threads together.
         angle_difference: mean over all corners, radians.
     """
 
@@ -45,10 +45,10 @@ class Reached(NamedTuple):
 
 
 def race(case: str, seconds: float, *, seed: int = 0) -> Iterator[Reached]:
-    """What the computed map and the preset `learned` reach on a mesh, and the straightforward way.
+    """What the computed map, the preset `learned` and the straightforward way reach on a mesh.
 
-    The computed map takes what it takes, `learned` has `seconds` by the clock, and the
-    straightforward way, told at 1, 2, 4, ... steps, `seconds` of processor time.
+    The computed map takes the time that it needs, and `learned` has `seconds` by the clock. The
+    straightforward way has `seconds` of processor time, and is measured after 1, 2, 4, ... steps.
 
     Raises:
         InputError: there is no such model, or it is no mesh.
@@ -89,7 +89,7 @@ def race(case: str, seconds: float, *, seed: int = 0) -> Iterator[Reached]:
 
 
 def race_table(case: str, seconds: float) -> Table:
-    """`race` as a table."""
+    """The results of `race` as a table."""
     columns = ("what", "iterations", "processor s", "angle difference")
     table = Table(*columns, title=f"Time to quality on {case}")
     for row in race(case, seconds):
@@ -102,12 +102,12 @@ def race_table(case: str, seconds: float) -> Table:
 def straightforward_maps(
     points: FloatArray, at: FloatArray, seed: int
 ) -> Iterator[tuple[float, FloatArray]]:
-    """Processor seconds of training and the map (V, 2) of `at` (V, 3) after each step, for ever.
+    """After each step, the processor seconds so far and the map (V, 2) of `at`; without an end.
 
     Args:
-        points: (N, 3) training points, centred, largest norm 1.
+        points: (N, 3) training points, with their box around the origin and a largest norm of 1.
         at: (V, 3) points to map, in the same frame.
-        seed: of torch's generator.
+        seed: the seed of torch's generator.
     """
     import torch
 
@@ -134,7 +134,7 @@ def straightforward_maps(
 
 
 def straightforward_networks() -> nn.ModuleDict:
-    """The stacks of the five networks; Deform and Cut have two each, "embed" and "move"."""
+    """The layers of the five networks; Deform and Cut have two stacks each, "embed" and "move"."""
     from torch import nn
 
     from parapoint.learned.presets import PAPER
@@ -160,7 +160,7 @@ def straightforward_networks() -> nn.ModuleDict:
 
 
 def _moved(networks: nn.ModuleDict, name: str, x: Tensor) -> Tensor:
-    """Deform or Cut of points."""
+    """The points (N, 2 or 3) moved by Deform or Cut."""
     import torch
 
     embedding = networks[f"{name}_embed"](x)
@@ -169,7 +169,7 @@ def _moved(networks: nn.ModuleDict, name: str, x: Tensor) -> Tensor:
 
 
 def straightforward_loss(networks: nn.ModuleDict, P: Tensor, grid: Tensor) -> Tensor:
-    """The weighted objective at all points (N, 3) and a lattice (M, 2)."""
+    """The weighted objective for all points (N, 3) and a lattice (M, 2) in the plane."""
     import torch
 
     from parapoint.learned.presets import PAPER
@@ -203,7 +203,7 @@ def straightforward_loss(networks: nn.ModuleDict, P: Tensor, grid: Tensor) -> Te
 
 
 def _nearest(points: Tensor, count: int) -> Tensor:
-    """(N, count) rows of the nearest other points."""
+    """(N, count) the rows of the nearest other points of each point."""
     import torch
 
     index: Tensor = torch.cdist(points, points).topk(count + 1, largest=False).indices
@@ -211,7 +211,7 @@ def _nearest(points: Tensor, count: int) -> Tensor:
 
 
 def _jacobian(values: Tensor, uv: Tensor) -> Tensor:
-    """(N, 3, 2), with a graph of its own."""
+    """(N, 3, 2) the Jacobians of values (N, 3) by uv (N, 2), which can be differentiated again."""
     import torch
 
     rows = [torch.autograd.grad(values[:, c].sum(), uv, create_graph=True)[0] for c in range(3)]
@@ -219,7 +219,7 @@ def _jacobian(values: Tensor, uv: Tensor) -> Tensor:
 
 
 def _distortion(J: Tensor) -> Tensor:
-    """Mean of |λ1 − λ2|."""
+    """Mean of |λ1 − λ2| of Jacobians (N, 3, 2), with singular values λ1 and λ2."""
     import torch
 
     E, G = J.square().sum(1).unbind(1)
@@ -231,7 +231,7 @@ def _distortion(J: Tensor) -> Tensor:
 
 
 def _anti_flip(J: Tensor, made: Tensor) -> Tensor:
-    """Mean over the points of how far their neighbours' normals turn away, T = π/2."""
+    """Mean over the points of how far the normals around them turn beyond T = π/2."""
     import torch
 
     from parapoint.learned.presets import PAPER

@@ -1,9 +1,8 @@
-"""`python -m benchmarks.checks.wild`: files as other tools write them, family by family.
+"""`python -m benchmarks.checks.wild`: read files as other tools write them, family by family.
 
-Each file is made here by a few lines, so what it means is known. It must be read as it was meant;
-where that cannot be known, one line that refuses it is right too. Per family the command prints how
-many were read, refused and wrong, and exits with 1 if one is wrong: a refusal counts as wrong where
-the file can be understood.
+A few lines make each file here, so it is known what the file means, and it must be read that way.
+Only where a file does not show what it means may it be refused instead, with one line. The command
+prints for each family how many files were read, refused and wrong. It exits with 1 if one is wrong.
 """
 
 from __future__ import annotations
@@ -36,7 +35,9 @@ from parapoint.textures.placing import BORDER
 from parapoint.unwrapping.unwrap import Unwrap
 
 POINTS = np.array([[1.5, 2.25, -3], [4, 5.5, 6], [7, 8.25, 9]])
+"""(3, 3) the points that most files hold."""
 SEED = 0
+"""The seed of every random draw."""
 
 
 class Case(NamedTuple):
@@ -45,8 +46,8 @@ class Case(NamedTuple):
     Attributes:
         name: its name.
         data: its bytes.
-        is_right: whether what is read from that path is what was meant.
-        may_refuse: whether one line that refuses it is right as well.
+        is_right: tells whether what is read from a path is what the file means.
+        may_refuse: whether the file may be refused as well.
     """
 
     name: str
@@ -56,7 +57,7 @@ class Case(NamedTuple):
 
 
 class Tally(NamedTuple):
-    """What became of the files of a family: numbers read and refused, names of the wrong ones."""
+    """How many files of a family were read and how many refused, and the names of wrong ones."""
 
     read: int
     refused: int
@@ -92,13 +93,13 @@ def _shows(expected: FloatArray) -> Callable[[Path], bool]:
 
 
 def _cannot_be_told(path: Path) -> bool:
-    """Read what one line must refuse."""
+    """Read a file that must be refused."""
     read_surface(path)
     return False
 
 
 def commas() -> Iterator[Case]:
-    """Decimal commas, beside whatever parts the numbers."""
+    """Decimal commas, with each kind of separator between the numbers."""
     text = ["\n".join(" ".join(f"{x:g}" for x in row) for row in POINTS)]
     decimal = text[0].replace(".", ",")
     variants = {
@@ -118,7 +119,7 @@ def commas() -> Iterator[Case]:
 
 
 def marks() -> Iterator[Case]:
-    """Byte order marks and wide characters before each text format."""
+    """Every text format with a byte order mark, in characters of one, two and four bytes."""
     triangle = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     obj = "".join(f"v {x} {y} {z}\n" for x, y, z in triangle) + "f 1 2 3\n"
     off = "OFF\n3 1 0\n" + "".join(f"{x} {y} {z}\n" for x, y, z in triangle) + "3 0 1 2\n"
@@ -133,7 +134,7 @@ def marks() -> Iterator[Case]:
 
 
 def polygons() -> Iterator[Case]:
-    """Concave and bridged polygons, cut into triangles that do not fold."""
+    """Concave polygons, and one with a bridge to a hole, to be cut without a fold."""
     turn = 2 * np.pi * np.arange(24) / 24
     flower = np.stack([np.cos(turn), np.sin(turn)], 1) * (1 + 0.4 * np.cos(6 * turn))[:, None]
     shapes: dict[str, Any] = {
@@ -158,7 +159,7 @@ def polygons() -> Iterator[Case]:
 
 
 def _is_flat(path: Path, area: float) -> bool:
-    """Whether the map of a flat shape onto itself is perfect, and the area right."""
+    """Whether the map of a flat shape onto itself is perfect, and its area is this."""
     mesh, flat = read_parameterized(path)
     values = evaluate(mesh, flat)
     perfect = values["flipped_fraction"] == values["overlapped_fraction"] == 0
@@ -166,7 +167,7 @@ def _is_flat(path: Path, area: float) -> bool:
 
 
 def split_vertices() -> Iterator[Case]:
-    """A tube cut along a line, its vertices doubled there or at each corner, or rounded."""
+    """A tube cut along a line, with vertices doubled there, or at each corner, or rounded."""
     i, j = np.meshgrid(np.arange(13), np.arange(5), indexing="ij")
     uv = np.stack([i / 12, j / 4], axis=2).reshape(-1, 2)
     angle = 2 * np.pi * uv[:, 0]
@@ -190,7 +191,7 @@ def split_vertices() -> Iterator[Case]:
 
 
 def _is_tube(path: Path) -> bool:
-    """One chart, its seam one line along the tube."""
+    """Whether the map has one chart and, as its seam, one line along the tube."""
     mesh, flat = read_parameterized(path)
     values = evaluate(mesh, flat)
     seam = 4 / np.sqrt(mesh.face_areas.sum())
@@ -243,7 +244,7 @@ def _gltf(vertices: FloatArray, uv: FloatArray, faces: IntArray, **changes: Any)
 
 
 def gltf() -> Iterator[Case]:
-    """Nodes that mirror, extensions that are needed, instances."""
+    """Nodes that mirror, scale, nest and repeat a mesh, and extensions that a file needs."""
     square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     given = square, square[:, :2], np.array([[0, 1, 2], [0, 2, 3]])
     moved = {"translation": [5, 0, 0]}
@@ -263,7 +264,7 @@ def gltf() -> Iterator[Case]:
 
 
 def _faces_up(path: Path, faces: int, area: float) -> bool:
-    """Whether there are so many faces of this area together, all seen from above."""
+    """Whether there are this many faces, with this total area, which all face upwards."""
     mesh, flat = read_parameterized(path)
     up = unit_normals(mesh.vertices, mesh.faces)[:, 2]
     whole = len(flat.corners) == len(mesh.faces) == faces and (up > 0).all()
@@ -271,7 +272,7 @@ def _faces_up(path: Path, faces: int, area: float) -> bool:
 
 
 def written() -> Iterator[Case]:
-    """Pyramids, which are at SLIM's minimum as they start, unwrapped and read back."""
+    """Pyramids, unwrapped and read back. Tutte's embedding of one is SLIM's minimum already."""
     for sides, ending in enumerate((".ply", ".npz", ".glb", ".obj", ".ply"), start=3):
         turn = 2 * np.pi * np.arange(sides) / sides
         rim = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
@@ -284,7 +285,7 @@ def written() -> Iterator[Case]:
 
 
 def _is_written(path: Path, ending: str, faces: int, area: float) -> bool:
-    """Whether SLIM maps the surface, and `unwrap` writes it with its faces, turned as they are."""
+    """Whether SLIM maps the surface, and `unwrap` writes it with its own faces, not mirrored."""
     given = read_polygons(path)
     assert isinstance(given, Polygons)
     registry.method("slim")[1].parameterize(given.mesh, seed=SEED)
@@ -302,7 +303,7 @@ def _dome(count: int = 400) -> FloatArray:
 
 
 def strays() -> Iterator[Case]:
-    """Flying pixels, and rows without data, in the last rows."""
+    """Clouds whose last rows are flying pixels or stand for missing data."""
     rng = np.random.default_rng(SEED)
     far = rng.normal(size=(12, 3))
     far /= np.linalg.norm(far, axis=1, keepdims=True)
@@ -326,13 +327,13 @@ def _text(points: FloatArray) -> bytes:
 
 
 def _has_strays(path: Path, count: int) -> bool:
-    """Whether so many rows are left out, and no point off the surface that was found."""
+    """Whether this many rows are left out, and all others are on the surface that is found."""
     report = ComputedMap().fit(read_surface(path)).report_
     return report["strays"] == count and report["anchors"] == report["points"]
 
 
 def scan_lines() -> Iterator[Case]:
-    """Lines much farther apart than the points on them; beyond 1:30 advice is right too."""
+    """Scan lines much farther apart than the points on them; beyond 1:30 they may be refused."""
     for gap in (1, 8, 12, 20, 30, 100):
         x, y = np.meshgrid(np.arange(120.0), gap * np.arange(8.0))
         x += np.random.default_rng(SEED).uniform(0, 1, (8, 1))
@@ -346,7 +347,7 @@ def scan_lines() -> Iterator[Case]:
 
 
 def pcd() -> Iterator[Case]:
-    """Padding, sizes without POINTS, and types, as drivers of lidars write them."""
+    """Padding, types, and heads without POINTS, as the drivers of lidars write them."""
     for name, fields, sizes, types, counts, kind in (
         ("plain", "x y z", "4 4 4", "F F F", "1 1 1", "<3f"),
         ("doubles", "x y z", "8 8 8", "F F F", "1 1 1", "<3d"),
@@ -364,7 +365,7 @@ def pcd() -> Iterator[Case]:
 
 
 def las() -> Iterator[Case]:
-    """Noise and withheld points, which are left out; colours of 8 and 16 bits, packed or not."""
+    """Noise and withheld points, which are left out, and colours of 8 and 16 bits."""
     colours = np.array([[0, 128, 255], [9, 10, 11], [255, 0, 0], [1, 2, 3], [7, 8, 9]])
     points = np.concatenate([POINTS, [[1e6, 0, 0], [-1e6, 0, 0]]])
     for name, classes, withheld, kept in (
@@ -387,7 +388,7 @@ def las() -> Iterator[Case]:
 
 
 def _has_colours(path: Path, points: FloatArray, colours: IntArray, bits: int) -> bool:
-    """Whether these points (N, 3) are read, with these colours (N, 3) of so many bits."""
+    """Whether these points (N, 3) are read with these colours (N, 3), of this many bits."""
     surface = read_surface(path)
     assert isinstance(surface, PointCloud)
     found = surface.attributes["colours"]
@@ -407,12 +408,12 @@ FAMILIES: dict[str, Callable[[], Iterator[Case]]] = {
     "LAS": las,
     "written": written,
 }
-"""The files of each family."""
+"""What makes the files of each family."""
 
 
 @click.command()
 def main() -> None:
-    """Read files as other tools write them; exit with 1 if one is read wrong."""
+    """Read files as other tools write them, and exit with 1 if one is wrong."""
     logging.basicConfig(level=logging.ERROR, format="%(message)s")
     faults = 0
     with tempfile.TemporaryDirectory() as folder:

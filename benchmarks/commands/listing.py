@@ -24,15 +24,28 @@ def _add(table: Table, *texts: str) -> None:
 
 
 def suites() -> Table:
-    """Each suite with its cases and methods."""
-    from benchmarks.cases.suites import SUITES
+    """Each suite with its cases and methods, and how long it takes on one core, about."""
+    import dataclasses
+    from typing import Any, cast
 
-    table = _table("suite", "title", "cases", "methods", "seeds")
+    from baselines import registry
+    from benchmarks.cases.suites import SUITES
+    from benchmarks.running.expectation import about, expectation
+
+    def parameters(spec: str) -> tuple[str, dict[str, Any]]:
+        name, method = registry.method(spec)
+        return name, dataclasses.asdict(cast("Any", method))
+
+    table = _table("suite", "title", "cells", "one core", "download", "cases", "methods", "seeds")
     for suite in SUITES.values():
+        needs = expectation(suite, parameters)
         _add(
             table,
             suite.name,
             suite.title,
+            str(needs.cells),
+            about(needs.seconds),
+            f"{needs.megabytes:.0f} MB",
             ", ".join(suite.cases),
             ", ".join(suite.methods),
             ", ".join(map(str, suite.seeds)),

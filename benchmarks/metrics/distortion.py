@@ -1,17 +1,18 @@
 """Distortion of a map, face by face and as metrics: conformal, authalic, isometric.
 
-A face has the Jacobian J of the affine map from its own plane to UV, with singular values
-sigma1 >= sigma2 >= 0. Areas are scaled so that the 3D areas sum to 1 and the absolute UV areas
-sum to 1, and J with them; so no metric here changes with the scale of the surface or of the map.
+The map of a face from its own plane to UV is affine. Its Jacobian J has the singular values
+sigma1 >= sigma2 >= 0. The surface and the map are scaled so that the 3D areas sum to 1 and so do
+the absolute UV areas; no metric here depends on the scale of either.
 
-Faces that are degenerate in 3D have no distortion and take no part. Faces that are degenerate in
-UV only have infinite distortion: maxima are `inf`, order statistics count them as `inf`, means are
-taken over the others (`degenerate_uv_count` says how many were left out). With no face to measure
-a metric has its worst value: `inf`, and 0 for the smallest singular value.
+A face that is degenerate in 3D has no distortion and is left out. A face that is degenerate in UV
+alone has infinite distortion: it makes maxima `inf`, percentiles rank it above all others, and
+means leave it out (`degenerate_uv_count` says how many faces these are). Where there is no face to
+measure, a metric takes its worst value: `inf`, or 0 for the smallest singular value.
 
-Other conventions: Shay et al. print `symmetric_dirichlet` / 2 (Rabinovich et al. the same as here,
-OptCuts / 4 with an ideal of 1); `angle_discrepancy_total` is 3 times
-`angle_difference_area_weighted`; the L2 stretch of Sander et al. has the same normalization.
+Other papers scale some of these differently. Shay et al. print half of `symmetric_dirichlet`, and
+OptCuts a quarter of it, so that the ideal is 1; Rabinovich et al. print what we print.
+`angle_discrepancy_total` is 3 times `angle_difference_area_weighted`. The L2 stretch of Sander et
+al. is normalized as it is here.
 """
 
 from __future__ import annotations
@@ -26,26 +27,26 @@ from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
 
 SHORTEST_HEIGHT = 1e-12
-"""A triangle is degenerate if its height is no more than this times its longest side ..."""
+"""A triangle is degenerate if its height is at most this many times its longest side, ..."""
 ROUNDING = 4 * np.finfo(np.float64).eps
-"""... or no more than this times the largest coordinate: then its area is but rounding error."""
+"""... or at most this many times the largest coordinate: such an area is rounding error."""
 LARGEST = 1e151
-"""Larger coordinates are refused."""
+"""Largest coordinate, in the unit of the surface or of the map: areas beyond it overflow."""
 CLIPPED_RATIO = 10.0
-"""Where PartUV clips the area ratio."""
+"""Largest area ratio that PartUV counts; larger ones count as this one."""
 
 
 def power_of_two(values: FloatArray) -> float:
-    """The power of two just above the largest absolute value, 1 for zeros.
+    """The power of two just above the largest absolute value; 1 if all values are 0.
 
-    Dividing by it is exact and keeps squares and products far from overflow and underflow.
+    To divide by it is exact, and keeps squares and products from overflow and underflow.
     """
     return float(2.0 ** np.frexp(np.abs(values).max(initial=0.0))[1]) if values.any() else 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class Triangles:
-    """Every face of a mesh and its image, before any normalization; all arrays by face.
+    """Every face of a mesh and its image, before anything is normalized; arrays have a row a face.
 
     Attributes:
         area: (F,) 3D areas.
@@ -54,8 +55,8 @@ class Triangles:
         uv_angle: (F, 3) UV angle at each corner, radians.
         sigma1: (F,) larger singular value of J; 0 where the face is degenerate in 3D.
         sigma2: (F,) smaller singular value of J; 0 where degenerate in 3D or in UV.
-        degenerate_3d: (F,) no 3D area.
-        degenerate_uv: (F,) a 3D area, but no UV area.
+        degenerate_3d: (F,) whether the face has no 3D area.
+        degenerate_uv: (F,) whether it has a 3D area, but no UV area.
     """
 
     area: FloatArray
@@ -74,7 +75,7 @@ class Triangles:
 
 
 def triangles(mesh: Mesh, parameterization: Parameterization) -> Triangles:
-    """The faces of `mesh` and their images under `parameterization`.
+    """Measure the faces of `mesh` and their images under `parameterization`.
 
     Raises:
         InputError: coordinates are so large that areas overflow.
@@ -86,7 +87,7 @@ def triangles(mesh: Mesh, parameterization: Parameterization) -> Triangles:
             raise InputError(
                 f"coordinates of {what} above {LARGEST:g} make areas overflow: scale them down"
             )
-    # Sides (F, 2 or 3) opposite to corners 0, 1, 2.
+    # sides[k] and uv_sides[k], (F, 3) and (F, 2), are the sides opposite to corner k.
     points = [mesh.vertices[mesh.faces[:, k]] / scale for k in range(3)]
     images = [parameterization.uv[parameterization.corners[:, k]] / uv_scale for k in range(3)]
     sides = [points[(k + 2) % 3] - points[(k + 1) % 3] for k in range(3)]
@@ -121,7 +122,7 @@ def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def _is_degenerate(double_area: FloatArray, sides: list[FloatArray]) -> BoolArray:
-    """(F,) whether a triangle has no area; coordinates lie within [-1, 1]."""
+    """(F,) whether a triangle has no area. The coordinates lie within [-1, 1]."""
     longest = np.maximum.reduce([_norm(side) for side in sides])
     height = np.maximum(SHORTEST_HEIGHT * longest, ROUNDING)
     return np.asarray(double_area <= longest * height)
@@ -144,13 +145,15 @@ def _singular_values(
     length = np.where(known, _norm(a), 1.0)
     height = np.where(known, double_area, 1.0) / length
     along = np.einsum("ij,ij->i", a, b) / length
-    # In the face's plane a = (length, 0) and b = (along, height); the columns of J follow.
+    # In the plane of the face a is (length, 0) and b is (along, height). J maps a to uv_a and b to
+    # uv_b, which gives its two columns.
     column0 = uv_a / length[:, None]
     column1 = (uv_b - column0 * along[:, None]) / height[:, None]
     rotation = np.hypot(column0[:, 0] + column1[:, 1], column0[:, 1] - column1[:, 0])
     reflection = np.hypot(column0[:, 0] - column1[:, 1], column0[:, 1] + column1[:, 0])
     sigma1 = np.where(known, (rotation + reflection) / 2, 0.0)
-    # abs(rotation - reflection) / 2 loses all digits where sigma1 >> sigma2; the areas keep them.
+    # abs(rotation - reflection) / 2 loses all digits where sigma1 >> sigma2; sigma1 * sigma2, the
+    # ratio of the areas, keeps them.
     denominator = np.where(known & (sigma1 > 0), sigma1 * double_area, 1.0)
     sigma2 = np.where(known, np.abs(double_uv_area), 0.0) / denominator
     return sigma1, np.minimum(sigma1, sigma2)
@@ -158,16 +161,16 @@ def _singular_values(
 
 @dataclass(frozen=True, eq=False)
 class FaceDistortion:
-    """Normalized distortion of N chosen faces: what heatmaps, histograms and metrics read.
+    """The normalized distortion of N chosen faces, for heatmaps, histograms and metrics.
 
     Attributes:
         faces: (N,) rows of the mesh's faces; none is degenerate in 3D.
         area: (N,) 3D areas, sum 1.
-        uv_area: (N,) absolute UV areas, sum 1 (all 0 if no chosen face has a UV area).
+        uv_area: (N,) absolute UV areas, sum 1; all 0 if no chosen face has a UV area.
         sigma1: (N,) larger singular value of the normalized J.
         sigma2: (N,) smaller singular value.
         angle_difference: (N, 3) abs(3D angle - UV angle) at each corner, radians.
-        finite: (N,) False where the face is degenerate in UV, so its distortion infinite.
+        finite: (N,) False where the face is degenerate in UV, which makes its distortion infinite.
     """
 
     faces: IntArray
@@ -217,11 +220,11 @@ class FaceDistortion:
 
 
 def face_distortion(faces: Triangles, chosen: BoolArray | None = None) -> FaceDistortion:
-    """The distortion of the `chosen` (F,) faces (default: all), normalized over these alone."""
+    """The distortion of the `chosen` (F,) faces, by default of all, normalized over these alone."""
     keep = ~faces.degenerate_3d if chosen is None else chosen & ~faces.degenerate_3d
     area, uv_area = faces.area[keep], np.abs(faces.uv_area[keep])
     total, uv_total = float(area.sum()), float(uv_area.sum())
-    # Without any UV area there is no scale; 1 keeps the arrays finite, every face is degenerate.
+    # Without any UV area there is no scale, and every face is degenerate; 1 keeps arrays finite.
     stretch = np.sqrt(total / uv_total) if uv_total > 0 else 1.0
     return FaceDistortion(
         faces=np.flatnonzero(keep).astype(np.int64),
@@ -235,7 +238,7 @@ def face_distortion(faces: Triangles, chosen: BoolArray | None = None) -> FaceDi
 
 
 def mean(values: FloatArray, weights: FloatArray | None = None) -> float:
-    """The (weighted) mean of the finite values; inf if there is none."""
+    """The mean of the finite values, weighted if weights are given; inf if no value is finite."""
     finite = np.isfinite(values)
     if not finite.any():
         return float("inf")
@@ -243,23 +246,23 @@ def mean(values: FloatArray, weights: FloatArray | None = None) -> float:
 
 
 def percentile(values: FloatArray, percent: float, weights: FloatArray | None = None) -> float:
-    """The smallest value that `percent` of all weight does not exceed; inf if there are none."""
+    """The smallest value that `percent` of the weight does not exceed; inf without values."""
     if len(values) == 0:
         return float("inf")
     order = np.argsort(values)
     reached = np.cumsum(np.ones(len(values)) if weights is None else weights[order])
-    # The slack absorbs the rounding of the sum, so that equal weights split where they should.
+    # The sum is rounded; a little slack lets equal weights split where they should.
     target = percent / 100 * reached[-1] * (1 - 1e-12)
     return float(values[order[np.searchsorted(reached, target)]])
 
 
 def maximum(values: FloatArray) -> float:
-    """The largest value; inf if there are none."""
+    """The largest value; inf if there are no values."""
     return float(values.max()) if len(values) else float("inf")
 
 
 def angle_difference_mean(distortion: FaceDistortion) -> float:
-    """Mean over the corners, unweighted: the conformality of ParaPoint's supplement and of FAM."""
+    """Unweighted mean over the corners: the conformality of ParaPoint's supplement and of FAM."""
     return mean(distortion.angle_difference[distortion.finite].reshape(-1))
 
 
@@ -272,17 +275,17 @@ def angle_difference_area_weighted(distortion: FaceDistortion) -> float:
 
 
 def angle_difference_p95(distortion: FaceDistortion) -> float:
-    """95th percentile over the corners, unweighted; corners of UV-degenerate faces left out."""
+    """Unweighted 95th percentile over the corners, those of faces degenerate in UV left out."""
     return percentile(distortion.angle_difference[distortion.finite].reshape(-1), 95)
 
 
 def angle_difference_max(distortion: FaceDistortion) -> float:
-    """Largest angle difference; corners of UV-degenerate faces left out."""
+    """Largest angle difference, that of faces degenerate in UV left out."""
     return maximum(distortion.angle_difference[distortion.finite].reshape(-1))
 
 
 def angle_discrepancy_total(distortion: FaceDistortion) -> float:
-    """Area-weighted sum over the three corners (Shay et al.)."""
+    """Sum over the three corners of a face, averaged over the faces by area (Shay et al.)."""
     return 3 * angle_difference_area_weighted(distortion)
 
 
@@ -308,26 +311,26 @@ def quasi_conformal_max(distortion: FaceDistortion) -> float:
 
 
 def area_discrepancy_total(distortion: FaceDistortion) -> float:
-    """Sum of abs(UV area - 3D area) (Shay et al.): 0 to 2; inf without any UV area."""
+    """Sum of abs(UV area - 3D area), from 0 to 2 (Shay et al.); inf without any UV area."""
     if not distortion.finite.any():
         return float("inf")
     return float(np.abs(distortion.uv_area - distortion.area).sum())
 
 
 def area_distortion_max(distortion: FaceDistortion) -> float:
-    """Largest a/A + A/a - 2 (Shay et al.)."""
+    """Largest a/A + A/a - 2, with UV area a and 3D area A (Shay et al.)."""
     if not len(distortion.faces) or not distortion.finite.all():
         return float("inf")
     return float((distortion.area_ratio + 1 / distortion.area_ratio).max() - 2)
 
 
 def area_log_ratio_mean(distortion: FaceDistortion) -> float:
-    """Area-weighted mean of abs(log(a/A))."""
+    """Area-weighted mean of abs(log(a/A)), with UV area a and 3D area A."""
     return mean(distortion.area_log_ratio, distortion.area)
 
 
 def area_ratio_clipped_mean(distortion: FaceDistortion) -> float:
-    """Mean over the faces, unweighted, of max(a/A, A/a) clipped at 10 (PartUV)."""
+    """Unweighted mean over the faces of max(a/A, A/a), clipped at CLIPPED_RATIO (PartUV)."""
     if not distortion.finite.any():
         return float("inf")
     largest_log = np.log(CLIPPED_RATIO)
@@ -335,7 +338,7 @@ def area_ratio_clipped_mean(distortion: FaceDistortion) -> float:
 
 
 def symmetric_dirichlet(distortion: FaceDistortion) -> float:
-    """Area-weighted mean of the symmetric Dirichlet density (SLIM, OptCuts): ideal 4."""
+    """Area-weighted mean of the symmetric Dirichlet energy (SLIM, OptCuts); the ideal is 4."""
     return mean(distortion.symmetric_dirichlet, distortion.area)
 
 

@@ -28,6 +28,9 @@ STARVED_SHARE = 0.02
 """Fraction of the surface that may be starved in a usable map: that may get less than a quarter of
 its fair area (see `benchmarks.metrics.usability`)."""
 
+FROM_POINTS = frozenset({"parapoint", "computed", "fam", "nuvo", "meshed"})
+"""Methods whose maps are made of points alone, so that a few flips at a face are forgiven."""
+
 BOUNDS = (
     f"broken: more than {BROKEN:.0%} of the surface flipped or overlapped, or not finite; "
     f"collapsed: a part of at least {LEAST_PART:.0%} of the surface has less than a quarter of its "
@@ -72,6 +75,24 @@ def grade(values: Mapping[str, float], *, of_cloud: bool) -> Grade:
         else faces == 0 and overlapped == 0 and degenerate == 0
     )
     return "usable" if is_sound and starved <= STARVED_SHARE else "flawed"
+
+
+def grade_of(method: str, values: Mapping[str, object]) -> Grade | None:
+    """The grade of a cell; None where it has no map or lacks a metric that the grade needs.
+
+    Args:
+        method: registry name.
+        values: the cell's metrics by name; those it does not have are missing or nan.
+    """
+    known = {
+        name: float(value)
+        for name, value in values.items()
+        if isinstance(value, int | float) and not math.isnan(value)
+    }
+    try:
+        return grade(known, of_cloud=method in FROM_POINTS)
+    except KeyError:
+        return None
 
 
 def _grade_of_points(values: Mapping[str, float]) -> Grade:

@@ -51,8 +51,8 @@ class Overlaps:
         pair_count: number of overlapping pairs.
         distant_pair_count: number of those that share no row of uv.
         sampled: whether there were too many candidates to look at each. Then areas and numbers are
-            unbiased estimates from a sample, numbers mostly within 1 % and sums of areas within 5 %;
-            and a triangle of which `ROUNDS` samples could not tell whether it overlaps another
+            unbiased estimates from a sample, numbers mostly within 1 % and sums of areas within
+            5 %; and a triangle of which `ROUNDS` samples could not tell whether it overlaps another
             counts as one that does.
     """
 

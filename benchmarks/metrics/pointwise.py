@@ -1,7 +1,7 @@
-"""Metrics of a map of a point cloud, which need no mesh: a raw scan can be scored.
+"""Metrics of a map of a point cloud. They need no mesh, so that a raw scan can be scored.
 
-Neighbours are the k = 8 nearest other points. A surface has no area here: every mean is over the
-points, each counting the same.
+Neighbours are the k = 8 nearest other points. Without faces there are no areas to weigh by: every
+mean is over the points, and each point counts the same.
 """
 
 from __future__ import annotations
@@ -24,12 +24,15 @@ from parapoint.surfaces.scan_lines import breadth
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, PointCloud
 
 NEIGHBOURS = 8
+"""Nearest other points that count as the neighbours of a point: k."""
 WIDER = 1.5
-"""A neighbourhood on scan lines holds so many times the points that are just enough to spread."""
+"""On scan lines a neighbourhood reaches this many times as far, counted in points, as is just
+enough to leave the line."""
 SEAM_NEIGHBOURS = 3
-"""K_cut of ParaPoint; T_cut is `SPANNING_LENGTH`."""
+"""Nearest other points across which a seam is looked for: K_cut of ParaPoint. Its T_cut is
+`SPANNING_LENGTH`."""
 RANKED_POINTS = 20_000
-"""Ranks are taken at this many points at most, evenly spread over the cloud's order."""
+"""Ranks are taken at no more points than this, evenly spread over the order of the cloud."""
 COUNTED = 200_000_000
 """Points that all ranks together count, at most; beyond, evenly spread ranks stand for all."""
 PROBES = 256
@@ -38,12 +41,12 @@ PROBES = 256
 
 @dataclass(frozen=True, eq=False)
 class PointMap:
-    """What the point-cloud metrics read; both sets of coordinates are scaled by powers of two.
+    """A mapped point cloud, with what several metrics share; scaled by powers of two.
 
     Attributes:
-        points: (P, 3) points that the map has a place for.
+        points: (P, 3) the points that have a uv.
         uv: (P, 2) their images.
-        coverage: share of all points, from 0 to 1, that these are.
+        coverage: the share of all points, from 0 to 1, that have a uv.
     """
 
     points: FloatArray
@@ -62,7 +65,7 @@ class PointMap:
 
     @property
     def k(self) -> int:
-        """Number of neighbours: 8, or all other points of a smaller cloud."""
+        """Number of neighbours: NEIGHBOURS, or all other points of a smaller cloud."""
         return min(NEIGHBOURS, len(self.points) - 1)
 
     @cached_property
@@ -77,9 +80,10 @@ class PointMap:
 
     @cached_property
     def around(self) -> IntArray:
-        """(P, k) the neighbours, or others that lie to all sides where these are on a scan line.
+        """(P, k) other points that lie to all sides of each point.
 
-        There k are taken evenly, by their rank, from the nearest that spread over the surface
+        These are its neighbours, unless all of them lie on its own scan line. Then they are chosen
+        evenly by rank among as many nearest points as spread over the surface
         (`parapoint.surfaces.scan_lines`).
         """
         if (count := breadth(self.points)) is None:
@@ -95,8 +99,8 @@ class PointMap:
     def singular_values(self) -> FloatArray:
         """(P, 2) singular values, larger first, of the least-squares J at each point.
 
-        J maps offsets within the tangent plane, spanned by the two main directions of the
-        neighbourhood, to UV offsets. (0, 0) where the neighbourhood spans no plane.
+        J maps offsets in the tangent plane to offsets in UV; the two main directions of the points
+        around give the plane. (0, 0) where these points span no plane.
         """
         around = self.around
         offsets = self.points[around] - self.points[:, None]
@@ -113,7 +117,7 @@ class PointMap:
     def spanning(self) -> BoolArray:
         """(P,) whether the map tears between a point and one of its neighbours.
 
-        The edge rule of `benchmarks.metrics.seams` (conditions 1 and 2) on the graph of neighbours.
+        Conditions 1 and 2 of `benchmarks.metrics.seams`, for pairs of neighbours in place of edges.
         """
         start = np.repeat(np.arange(len(self.points)), self.k)
         end = self.neighbours.reshape(-1)
@@ -127,7 +131,7 @@ class PointMap:
 
 
 def point_map(cloud: PointCloud, parameterization: PointParameterization) -> PointMap:
-    """The map of `cloud`.
+    """The points of `cloud` that have a uv, with their images.
 
     Raises:
         InputError: the numbers of points differ, or there are fewer than four.
@@ -163,14 +167,15 @@ def nearest_others(tree: cKDTree, k: int) -> IntArray:
         crowded = np.flatnonzero(size[group] > k + 1)
         step = (rank[crowded, None] + np.arange(k + 1)) % size[group[crowded], None]
         found[crowded] = order[first[group[crowded], None] + step]
-    # A point comes first in its own list, unless it has duplicates: take it out wherever it is.
+    # A point heads its own list, unless another point lies at the same place. It is taken out
+    # wherever it is; where it is not in the list at all, the last entry goes.
     own = found == np.arange(len(found))[:, None]
     own[~own.any(axis=1), -1] = True
     return np.asarray(found[~own].reshape(len(found), k), dtype=np.int64)
 
 
 def local_quasi_conformal_mean(point_map: PointMap) -> float:
-    """Mean of sigma1/sigma2 of the local Jacobians; those of rank < 2 are left out."""
+    """Mean of sigma1/sigma2 of the local Jacobians of rank 2."""
     return mean(_quasi_conformal(point_map))
 
 
@@ -187,7 +192,7 @@ def _quasi_conformal(point_map: PointMap) -> FloatArray:
 
 
 def local_area_log_ratio_mean(point_map: PointMap) -> float:
-    """Mean of abs(log(sigma1 sigma2) - median of the same); those of rank < 2 are left out."""
+    """Mean of abs(log(sigma1 sigma2) - its median) of the local Jacobians of rank 2."""
     return mean(_area_log_ratio(point_map))
 
 
@@ -201,17 +206,18 @@ def _area_log_ratio(point_map: PointMap) -> FloatArray:
     known = smaller > larger * 1e-12
     ratio = np.full(len(larger), np.inf)
     log = np.log(larger[known]) + np.log(smaller[known])
-    # Without areas there is no total to scale by; the median of the logarithms stands for it.
+    # Without areas there is no total to scale by; the median of the logarithms takes its place.
     ratio[known] = np.abs(log - np.median(log)) if known.any() else log
     return ratio
 
 
 def _local_ratio(point_map: PointMap) -> FloatArray:
-    """(P,) local area, sigma1 sigma2, over its mean.
+    """(P,) the local area, sigma1 sigma2, over the mean of all.
 
-    nan where the neighbourhood spans no plane. So it is where the map tears and the area is above
-    the median: the two sides of a seam lie far apart in UV, and what lies between them would make
-    all other areas small. What is squeezed one way alone looks torn, too, and stays.
+    It is nan where the points around span no plane. It is nan, too, where the map tears and the
+    local area is above the median: the sides of a seam lie far apart in UV, and the space between
+    them would make all other areas look small. A place that is squeezed along one direction also
+    looks torn, but its local area is small, so it stays.
     """
     larger, smaller = point_map.singular_values.T
     area = np.where(larger > 0, larger * smaller, np.nan)
@@ -223,16 +229,16 @@ def _local_ratio(point_map: PointMap) -> FloatArray:
 
 
 def starved_point_fraction(point_map: PointMap) -> float:
-    """Share of the points with a local area below a quarter of the mean; 1 without any."""
+    """Share of the points with a local area below a quarter of the mean; 1 if none has any."""
     ratio = _local_ratio(point_map)
     known = np.isfinite(ratio)
     return float((ratio[known] < STARVED).mean()) if known.any() else 1.0
 
 
 def point_part_area_ratio_min(point_map: PointMap) -> float:
-    """Smallest mean ratio of a connected part of starved points that holds 1 %; 1 for none.
+    """Smallest mean ratio of a connected part of starved points that holds at least 1 % of all.
 
-    Points connect to their nearest neighbours in space.
+    Points are connected to their neighbours in space. 1 where there is no such part.
     """
     ratio = _local_ratio(point_map)
     starved = ratio < STARVED
@@ -251,12 +257,12 @@ def point_part_area_ratio_min(point_map: PointMap) -> float:
 
 
 def neighbour_trustworthiness(point_map: PointMap) -> float:
-    """How few strangers are among the UV neighbours (Venna and Kaski 2001): 1 if none."""
+    """1 if all neighbours in UV are neighbours in space too, else less (Venna and Kaski 2001)."""
     return _rank_agreement(point_map.uv_neighbours, point_map.neighbours, point_map.tree)
 
 
 def neighbour_continuity(point_map: PointMap) -> float:
-    """How few of the neighbours are lost in UV (Venna and Kaski 2001): 1 if none."""
+    """1 if all neighbours in space are neighbours in UV too, else less (Venna and Kaski 2001)."""
     return _rank_agreement(point_map.neighbours, point_map.uv_neighbours, point_map.uv_tree)
 
 
@@ -266,9 +272,15 @@ def neighbour_preservation(point_map: PointMap) -> float:
 
 
 def _rank_agreement(found: IntArray, expected: IntArray, tree: cKDTree) -> float:
-    """1 - 2 / (n k (2n - 3k - 1)) sum of (rank - k) over `found` that are not `expected`.
+    """1 - 2 / (n k (2n - 3k - 1)) times the sum of (rank - k) over `found` but not `expected`.
 
-    Ranks are by distance in `tree`. 1 where a cloud is too small for the formula.
+    The rank is that among all points by distance in `tree`. 1 where a cloud is too small for the
+    formula.
+
+    Args:
+        found: (P, k) for each point, the neighbours of the one kind.
+        expected: (P, k) its neighbours of the other kind.
+        tree: the points in the space in which `expected` are nearest.
     """
     count, k = found.shape
     if 2 * count - 3 * k - 1 <= 0:
@@ -278,8 +290,8 @@ def _rank_agreement(found: IntArray, expected: IntArray, tree: cKDTree) -> float
     row, column = np.nonzero(stranger)
     centre = tree.data[asked[row]]
     distance = np.linalg.norm(tree.data[found[asked[row], column]] - centre, axis=1)
-    # As many points as lie within the distance, the point itself among them, give the rank + 1.
-    # A little more distance keeps the stranger in, whose own distance is rounded.
+    # The number of points within the distance, the point itself among them, is the rank plus 1.
+    # The distance is rounded; a little more of it makes sure that the stranger is among them.
     distance *= 1 + 1e-12
 
     def excess(chosen: IntArray) -> FloatArray:
@@ -297,9 +309,10 @@ def _rank_agreement(found: IntArray, expected: IntArray, tree: cKDTree) -> float
 
 
 def uv_collision_fraction(point_map: PointMap) -> float:
-    """Fraction of points whose nearest image belongs to a point far away: sheets on one another.
+    """Fraction of the points whose nearest image is that of a point far away on the surface.
 
-    Far is more than 5 times the distance to the k-th neighbour.
+    There the map lays one sheet of the surface on another. Far away is more than SPANNING_STRETCH
+    times the distance to the k-th neighbour.
     """
     points = point_map.points
     nearest = point_map.uv_neighbours[:, 0]
@@ -309,9 +322,10 @@ def uv_collision_fraction(point_map: PointMap) -> float:
 
 
 def seam_point_fraction(point_map: PointMap) -> float:
-    """Fraction of points with one of the 3 nearest more than 1 % of L away in UV (ParaPoint).
+    """Fraction of the points with one of their 3 nearest more than 1 % of L away in UV (ParaPoint).
 
-    The threshold is meant for dense clouds: from some 50,000 points on only seams exceed it.
+    L is the side of the square bounding box of the map. The threshold is meant for dense clouds:
+    from some 50,000 points on, only pairs across a seam exceed it.
     """
     near = point_map.neighbours[:, :SEAM_NEIGHBOURS]
     distance = np.linalg.norm(point_map.uv[near] - point_map.uv[:, None], axis=2).max(axis=1)
@@ -319,5 +333,5 @@ def seam_point_fraction(point_map: PointMap) -> float:
 
 
 def spanning_point_fraction(point_map: PointMap) -> float:
-    """Fraction of points where the map tears between neighbours."""
+    """Fraction of the points between which and a neighbour the map tears."""
     return float(point_map.spanning.mean())

@@ -1,21 +1,24 @@
-"""Seams, charts and packing of a map, and the faces that span a seam which the map does not have.
+"""Seams, charts and packing of a map, and the faces that span a seam.
 
-A neural map gives one uv to each vertex, so on a closed surface some faces bridge its learned cut:
-their corners lie on both banks, and drawn in the plane they cross over others. The rule that finds
-them, the same for every map: a UV edge between rows i and j is **spanning** if
+A neural map gives one uv to each vertex, so it cannot show the cut of a closed surface as a seam.
+Instead some faces span it: their corners lie on both sides of the cut, and in the plane they are
+drawn across other faces. One rule finds them in every map. An edge of the map is **spanning** if
 
 1. it is longer than 1 % of L, the side of the square bounding box of the map (ParaPoint's T_cut),
-2. its stretch, UV length over 3D length, exceeds 5 times that of its surroundings, and
-3. its UV length exceeds 5 times what its surroundings would make of its 3D vector,
+2. its stretch, UV length over 3D length, is more than 5 times the stretch of the edges around it,
+3. and its UV length is more than 5 times the length that the faces around it would give it, that
+   is, to which their Jacobians map its 3D vector.
 
-and a face is spanning if one of its edges is and it overlaps another face. The surroundings at an
-end are the edges (2) or the Jacobians of the faces (3) there, by their lower quartile, of the two
-ends the calmer one: so one sound bank suffices, and half of all edges at an end may cross the cut.
-Condition 2 alone takes anisotropic faces (a pole, a Tutte map) for spanning, 3 alone thin faces
-whose Jacobians are wild, both together a few of SLIM's where it squeezes a finger flat. With the
-overlap no face of an injective map spans, however distorted: a face that bridges the gap of a cut
-without crossing anything is part of such a map, and its distortion counts. On a sphere in
-longitude and latitude the faces that bridge the date line span, and no others away from the poles.
+Around an edge means at one of its ends, at the end where the lower quartile of these values is
+smaller. So it is enough that one side of the cut is sound, and half of the edges there may cross
+it. A face is **spanning** if it has a spanning edge and overlaps another face.
+
+Each condition has its reason. The second alone would accept anisotropic faces, as at a pole or in
+Tutte's embedding; the third alone would accept faces next to thin ones, whose Jacobians are wild;
+and both together would accept a few faces where SLIM squeezes a finger flat. The overlap rules all
+of these out: no face of a one-to-one map spans a seam, however distorted it is. A face that bridges
+a cut and crosses nothing is a part of the map, and its distortion counts. On a sphere mapped by
+longitude and latitude, the faces across the date line span it, and no others away from the poles.
 """
 
 from __future__ import annotations
@@ -30,11 +33,11 @@ from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
 
 SPANNING_LENGTH = 0.01
-"""Shortest spanning edge, in units of L: T_cut of ParaPoint."""
+"""UV length above which an edge may span a seam, in units of L: T_cut of ParaPoint."""
 SPANNING_STRETCH = 5.0
-"""How many times more a spanning edge is stretched than its surroundings."""
+"""A spanning edge is stretched more than this many times as much as what is around it."""
 QUARTILE = 0.25
-"""Which quantile stands for the surroundings."""
+"""The quantile, from 0 to 1, of the stretches around an edge that its own is compared with."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +47,8 @@ class Seams:
     Attributes:
         mesh: the surface.
         parameterization: the map.
-        triangles: its faces.
-        overlaps: which of them overlap.
+        triangles: its faces, measured.
+        overlaps: which of the faces overlap.
     """
 
     mesh: Mesh
@@ -55,7 +58,7 @@ class Seams:
 
 
 def square_side(uv: FloatArray) -> float:
-    """L: the side of the square bounding box of (T, 2) coordinates, 0 for none."""
+    """L, the side of the square bounding box of (T, 2) coordinates; 0 if there are none."""
     return float(np.ptp(uv, axis=0).max()) if len(uv) else 0.0
 
 
@@ -65,9 +68,9 @@ def chart_count(seams: Seams) -> float:
 
 
 def seam_length(seams: Seams) -> float:
-    """3D length of the cut, each seam edge once, / sqrt(total area); original boundary is none.
+    """3D length of the cut, each of its edges counted once, over the root of the total area.
 
-    inf for a cut surface without area.
+    The boundary of the surface is no part of the cut. inf where a surface without area is cut.
     """
     start, end = seams.parameterization.seams(seams.mesh).T
     length = _lengths(seams.mesh.vertices[end] - seams.mesh.vertices[start]).sum()
@@ -75,7 +78,7 @@ def seam_length(seams: Seams) -> float:
 
 
 def uv_boundary_length(seams: Seams) -> float:
-    """UV length of all chart boundaries / sqrt(total UV area) (Shay et al.); inf without area."""
+    """UV length of all chart boundaries over the root of the UV area (Shay et al.); inf without."""
     uv, parameterization = seams.parameterization.uv, seams.parameterization
     start, end = parameterization.edges[parameterization.edge_face_count == 1].T
     length = float(_lengths(uv[end] - uv[start]).sum())
@@ -83,9 +86,9 @@ def uv_boundary_length(seams: Seams) -> float:
 
 
 def packing_efficiency(seams: Seams) -> float:
-    """UV area covered at least once / area of the square bounding box (Shay et al.).
+    """UV area that is covered at least once, over that of the square bounding box (Shay et al.).
 
-    Exact where no faces overlap; the part under overlapping faces is integrated along scanlines
+    It is exact where no faces overlap. The area under faces that do is integrated along scanlines
     (`overlap.covered_area`).
     """
     images = seams.parameterization.uv[seams.parameterization.corners]
@@ -96,10 +99,10 @@ def packing_efficiency(seams: Seams) -> float:
 
 
 def resolution(seams: Seams) -> float:
-    """Largest 1/sigma2 with the map scaled into the unit square and the mesh as it is.
+    """Texels along a side of the texture that give every face one texel per unit of length.
 
-    The texels along a side of the texture that give every face one texel per unit length
-    (Shay et al.). Faces degenerate in 3D take no part.
+    This is the largest 1/sigma2 of the map scaled into the unit square, with the mesh in its own
+    unit (Shay et al.). Faces that are degenerate in 3D are left out.
     """
     sigma2 = seams.triangles.sigma2[~seams.triangles.degenerate_3d]
     side = square_side(_used(seams.parameterization, seams.parameterization.uv))
@@ -118,7 +121,7 @@ def _lengths(vectors: FloatArray) -> FloatArray:
 def spanning_faces(
     mesh: Mesh, parameterization: Parameterization, overlapped: BoolArray
 ) -> BoolArray:
-    """(F,) whether a face spans a seam, by the rule of this module.
+    """(F,) whether a face spans a seam, by the rule at the head of this file.
 
     Args:
         mesh: the surface.
@@ -132,12 +135,12 @@ def spanning_faces(
 
 
 def spanning_edges(mesh: Mesh, parameterization: Parameterization) -> BoolArray:
-    """(E,) whether an edge of `parameterization.edges` spans, by the rule of this module."""
+    """(E,) whether an edge of `parameterization.edges` is spanning, by the same rule."""
     uv = parameterization.uv / power_of_two(parameterization.uv)
     edges, corners = parameterization.edges, parameterization.corners
     uv_length = _lengths(uv[edges[:, 1]] - uv[edges[:, 0]])
     spanning = uv_length > SPANNING_LENGTH * square_side(_used(parameterization, uv))
-    # Only long edges need surroundings: few, unless the mesh is coarse.
+    # Only what is around long edges is looked at; these are few, unless the mesh is coarse.
     wanted = np.zeros(len(uv), dtype=bool)
     wanted[edges[spanning]] = True
     near = np.flatnonzero(wanted[edges].any(axis=1))
@@ -180,16 +183,17 @@ def _vectors(
 def _usual_length(
     points: FloatArray, uv: FloatArray, corners: IntArray, ends: IntArray, vectors: FloatArray
 ) -> FloatArray:
-    """(C,) UV length that the Jacobians of the faces around give each candidate's 3D vector.
+    """(C,) the UV length that the faces around an edge would give it.
 
-    Their lower quartile, of both ends the smaller one.
+    Each Jacobian of a face at one end of the edge maps its 3D vector to a UV length; this is the
+    lower quartile of these lengths, at the end where it is smaller.
 
     Args:
-        points: (F, 3, 3) corners of the faces.
-        uv: (T, 2) rows.
-        corners: (F, 3) row of each corner.
-        ends: (C, 2) rows of uv that each candidate joins.
-        vectors: (C, 3) its 3D vector.
+        points: (F, 3, 3) the corners of the faces in space.
+        uv: (T, 2) rows of uv.
+        corners: (F, 3) the row of uv of each corner.
+        ends: (C, 2) the rows of uv that each edge joins.
+        vectors: (C, 3) the 3D vector of each edge.
     """
     rows = len(uv)
     wanted = np.zeros(rows, dtype=bool)
@@ -201,13 +205,14 @@ def _usual_length(
     squared = np.einsum("ij,ij->i", normal, normal)
     solid = squared > 0
     faces, a, b, normal, images = faces[solid], a[solid], b[solid], normal[solid], images[solid]
-    # The gradients of the barycentric coordinates of corners 1 and 2 make J (N, 2, 3).
+    # J (N, 2, 3) is the sum over corners 1 and 2 of the UV side to the corner times the gradient of
+    # the barycentric coordinate of the corner.
     gradient_a = np.cross(b, normal) / squared[solid, None]
     gradient_b = np.cross(normal, a) / squared[solid, None]
     jacobian = np.einsum("ni,nj->nij", images[:, 1] - images[:, 0], gradient_a)
     jacobian += np.einsum("ni,nj->nij", images[:, 2] - images[:, 0], gradient_b)
 
-    # Faces by row: those at row r are face[first[r] : first[r] + count[r]].
+    # The faces at row r of uv are face[first[r] : first[r] + count[r]].
     row = corners[faces].reshape(-1)
     face = np.argsort(row, kind="stable") // 3
     count = np.bincount(row, minlength=rows)
@@ -225,9 +230,9 @@ def _usual_length(
 
 
 def _lower_quartiles(group: IntArray, values: FloatArray, groups: int) -> FloatArray:
-    """(groups,) the lower quartile (the value at place floor((n - 1) / 4)) of each group's values.
+    """(groups,) the lower quartile of the values of each group; inf where a group has none.
 
-    inf where a group has none.
+    Of n values in order it is the one at place floor((n - 1) / 4), counted from 0.
     """
     ordered = values[np.lexsort((values, group))]
     count = np.bincount(group, minlength=groups)

@@ -1,7 +1,8 @@
-"""What a mean does not see: the worst part of a map, its seam, and its place in the unit square.
+"""What a mean does not show: the worst part of a map, its seam, and its place in the unit square.
 
-Ratios r are those of UV area to 3D area, both scaled to sum 1: where r is below a quarter
-(STARVED), a texture has less than half of the fair number of texels along a side.
+The ratio r of a face is its UV area over its 3D area, with each kind of area scaled to sum 1. Where
+r is below a quarter (STARVED), a texture has less than half of its fair number of texels along a
+side.
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, edge_components
 
 STARVED = 0.25
-"""Ratio r below which a place of the surface is starved of area."""
+"""Ratio r below which a place on the surface is starved of area."""
 LEAST_PART = 0.01
-"""Share of the surface, from 0 to 1, that a part must hold to be looked at by itself."""
+"""Share of the surface, from 0 to 1, from which on a starved part counts as collapsed."""
 WINDOW = 2
-"""Vertices on each side over which a seam is smoothed: four edges."""
+"""Vertices on either side of one that are averaged with it where a seam is smoothed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +29,8 @@ class Worst:
     """What the metrics of starved parts read.
 
     Attributes:
-        mesh: the surface, vertices at one place welded.
-        distortion: of the faces that are looked at.
+        mesh: the surface, with vertices at one place welded.
+        distortion: the distortion of the faces that count.
     """
 
     mesh: Mesh
@@ -37,9 +38,9 @@ class Worst:
 
     @cached_property
     def starved_parts(self) -> tuple[FloatArray, FloatArray]:
-        """(K,) share of the surface and (K,) mean ratio of each edge-connected starved part.
+        """(K,), (K,) the share of the surface and the mean ratio r of each starved part.
 
-        Parts connect on the surface, across seams.
+        Faces that share an edge of the surface are in one part, also where the map is cut between.
         """
         starved = np.flatnonzero(self.distortion.area_ratio < STARVED)
         label = edge_components(self.mesh.faces[self.distortion.faces[starved]])
@@ -57,9 +58,9 @@ def area_ratio_p01(worst: Worst) -> float:
 
 
 def part_area_ratio_min(worst: Worst) -> float:
-    """Smallest mean r of a starved part of at least 1 % of the surface; 1 where there is none.
+    """Smallest mean r of a starved part of at least LEAST_PART; 1 where there is no such part.
 
-    A collapsed ear or finger as one number. 0 without any face.
+    It shows an ear or a finger that has collapsed. 0 without any face.
     """
     if not len(worst.distortion.faces):
         return 0.0
@@ -68,7 +69,7 @@ def part_area_ratio_min(worst: Worst) -> float:
 
 
 def starved_area_fraction(worst: Worst) -> float:
-    """Share of the surface with r below a quarter; 1 without any face."""
+    """Share of the surface where r is below STARVED; 1 without any face."""
     distortion = worst.distortion
     if not len(distortion.faces):
         return 1.0
@@ -80,7 +81,7 @@ class Layout:
     """What the metrics of the seam's shape and of the unit square read.
 
     Attributes:
-        mesh: the surface, vertices at one place welded.
+        mesh: the surface, with vertices at one place welded.
         parameterization: the map.
         triangles: its faces.
     """
@@ -91,11 +92,12 @@ class Layout:
 
 
 def seam_jaggedness(layout: Layout) -> float:
-    """Length of the cut over that of the same lines smoothed at the scale of four edges.
+    """Length of the cut over the length of the same cut when smoothed over four edges.
 
-    The surface's own boundary is no cut. A straight cut has 1, as has a map without one. The cut is
-    split into lines at its ends and branching points; along each, a vertex is averaged with its
-    neighbours up to two edges away, as many on either side; ends stay.
+    The boundary of the surface is no part of the cut. A straight cut scores 1, and so does a map
+    without a cut. The cut is split into lines at its ends and branching points. Along each line, a
+    vertex is averaged with its neighbours up to two edges away, as many on the one side as on the
+    other; the ends of the line stay where they are.
     """
     edges = layout.parameterization.seams(layout.mesh)
     before = after = 0.0
@@ -129,9 +131,9 @@ def _smoothed(points: FloatArray) -> FloatArray:
 
 
 def _lines(edges: IntArray) -> list[list[int]]:
-    """The lines that edges (E, 2) form: vertices in order, from node to node or round a loop.
+    """The lines that edges (E, 2) form: their vertices in order, from node to node or round a loop.
 
-    A node is a vertex at which other than two edges meet.
+    A node is a vertex at which one edge ends, or more than two edges meet.
     """
     around: dict[int, list[int]] = {}
     for a, b in edges.tolist():
@@ -158,13 +160,13 @@ def _lines(edges: IntArray) -> list[list[int]]:
 
 
 def uv_outside_unit(layout: Layout) -> float:
-    """Largest distance by which a uv lies outside of the unit square; 0 where none does."""
+    """Largest distance of a uv from the unit square; 0 if all of them lie in it."""
     used = layout.parameterization.uv[layout.parameterization.corners.reshape(-1)]
     return float(np.linalg.norm(used - np.clip(used, 0.0, 1.0), axis=1).max(initial=0.0))
 
 
 def mirrored_area_fraction(layout: Layout) -> float:
-    """Share of the UV area that turns against the faces of the mesh; 1 without any UV area."""
+    """Share of the UV area that is mirrored, turned against its faces; 1 without any UV area."""
     uv_area = layout.triangles.uv_area
     total = float(np.abs(uv_area).sum())
     return float(np.abs(uv_area[uv_area < 0]).sum()) / total if total > 0 else 1.0

@@ -1,8 +1,8 @@
 """Validity of a map: flipped, degenerate and overlapping faces.
 
-A chart is turned over as a whole without harm (a mirrored chart has no flip), so a face is flipped
-if its orientation differs from the majority of its own chart, by 3D area. Where the mesh's own
-faces do not turn alike, which is no fault of a map, those of a chart are first made to.
+A chart that is mirrored as a whole has no flips. So a face counts as flipped if it is turned
+against the majority of its own chart, by 3D area. Where the faces of the mesh itself do not all
+turn the same way, which is no fault of the map, those of each chart are first made to.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ class Validity:
     Attributes:
         parameterization: the map.
         triangles: its faces.
-        whole: where this is a part of a map, the state of it all, and which faces (F,) these are.
+        whole: where these are some faces of a map, the whole of it, and which of its faces (F,)
+            they are; None where they are all.
     """
 
     parameterization: Parameterization
@@ -34,7 +35,7 @@ class Validity:
     whole: tuple[Validity, BoolArray] | None = None
 
     def of(self, faces: BoolArray) -> Validity:
-        """The state of some of the faces (F,); those are flipped that are so in the whole map."""
+        """The validity of some faces (F,); they are flipped if they are flipped in the whole."""
         parameterization = Parameterization(
             self.parameterization.uv, self.parameterization.corners[faces]
         )
@@ -43,10 +44,10 @@ class Validity:
 
     @cached_property
     def flipped(self) -> BoolArray:
-        """(F,) whether a face is folded against the majority of its chart, by 3D area.
+        """(F,) whether a face is turned against the majority of its chart, by 3D area.
 
-        Faces without UV area have no orientation and are not flipped. In a tie the
-        counter-clockwise faces are the majority.
+        A face without UV area has no orientation and is not flipped. If the two orientations have
+        equal area, the counter-clockwise faces are the majority.
         """
         if self.whole is not None:
             validity, faces = self.whole
@@ -57,15 +58,15 @@ class Validity:
 
     @property
     def turn(self) -> IntArray:
-        """(F,) -1 for faces to be turned so that across inner edges of a chart faces turn alike.
+        """(F,) -1 for each face that has to be turned so that neighbours in a chart turn alike.
 
-        1 for all others, and for all faces of a map that are so already.
+        1 for all other faces.
         """
         image, corners = self.parameterization, self.parameterization.corners
         forward = (corners < np.roll(corners, -1, axis=1)).reshape(-1)
         alike = np.bincount(image.edge_of_halfedge, forward) == 1
         turn = np.ones(len(corners), dtype=np.int64)
-        faces = np.flatnonzero(self.triangles.sign)  # others may name a row twice
+        faces = np.flatnonzero(self.triangles.sign)  # the others may use a row of uv twice
         if len(faces) and not alike[image.edge_face_count == 2].all():
             turned, _ = igl.bfs_orient(corners[faces])
             turn[faces[(turned != corners[faces]).any(axis=1)]] = -1
@@ -78,18 +79,18 @@ class Validity:
 
 
 def flipped_fraction(validity: Validity) -> float:
-    """Fraction of the faces that are flipped within their chart."""
+    """Fraction of the faces, by number, that are flipped within their chart."""
     return float(validity.flipped.mean())
 
 
 def flipped_fraction_global(validity: Validity) -> float:
-    """min(p, 1 - p) for the fraction p of faces with clockwise image (Shay et al.)."""
+    """min(p, 1 - p), where p is the fraction of faces with a clockwise image (Shay et al.)."""
     clockwise = float((validity.triangles.sign < 0).mean())
     return min(clockwise, 1 - clockwise)
 
 
 def flipped_area_fraction(validity: Validity) -> float:
-    """3D area fraction of the faces that are flipped within their chart."""
+    """Fraction of the 3D area that is flipped within its chart."""
     area = validity.triangles.area
     total = float(area.sum())
     return float(area[validity.flipped].sum()) / total if total > 0 else 0.0
@@ -103,20 +104,20 @@ def flipped_uv_area_fraction(validity: Validity) -> float:
 
 
 def degenerate_uv_count(validity: Validity) -> float:
-    """Number of faces with 3D area but without UV area."""
+    """Number of faces that have a 3D area, but no UV area."""
     return float(validity.triangles.degenerate_uv.sum())
 
 
 def degenerate_3d_count(validity: Validity) -> float:
-    """Number of faces without 3D area."""
+    """Number of faces that have no 3D area."""
     return float(validity.triangles.degenerate_3d.sum())
 
 
 def overlap_area(validity: Validity) -> float:
-    """Sum over ordered pairs of the common area, in 3D area fraction (Shay et al.).
+    """Common area of all ordered pairs of faces, as a fraction of the 3D area (Shay et al.).
 
-    The common area is divided by the magnification of the first face of the pair: a surface
-    that is covered twice throughout reads 1.
+    The common UV area of a pair is carried back to the first face of the pair. A map that lies on
+    itself everywhere, in two layers, scores 1.
     """
     triangles = validity.triangles
     uv_area, total = np.abs(triangles.uv_area), float(triangles.area.sum())
@@ -126,20 +127,20 @@ def overlap_area(validity: Validity) -> float:
 
 
 def overlap_pair_fraction(validity: Validity) -> float:
-    """Overlapping pairs that share no row of uv, over all pairs of faces (FAM)."""
+    """Fraction of all pairs of faces that overlap and share no row of uv (FAM)."""
     count = len(validity.triangles.area)
     return validity.overlaps.distant_pair_count / (count * (count - 1) / 2) if count > 1 else 0.0
 
 
 def overlapped_fraction(validity: Validity) -> float:
-    """3D area fraction of the faces that overlap another."""
+    """Fraction of the 3D area whose faces overlap another face."""
     area = validity.triangles.area
     total = float(area.sum())
     return float(area[validity.overlaps.overlapped].sum()) / total if total > 0 else 0.0
 
 
 def bijective(validity: Validity) -> float:
-    """1 if no face is flipped, degenerate in UV (only) or overlaps another; else 0."""
+    """1 if no face is flipped, degenerate in UV alone or overlaps another; else 0."""
     sound = not (
         validity.flipped.any()
         or validity.triangles.degenerate_uv.any()

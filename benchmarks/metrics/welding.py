@@ -1,9 +1,9 @@
-"""What a map is scored on: its covered faces, with vertices at one place counted as one.
+"""What a map is scored on: the faces that it covers, with vertices at one place counted as one.
 
-Writers of OBJ, PLY and glTF double a vertex at a seam, or give each corner a vertex of its own; and
-a map may leave faces out. One map gives one set of numbers, whatever the file: vertices at one
-place are welded, rows of uv that agree there are one row, and faces without a uv are left out and
-counted.
+Writers of OBJ, PLY and glTF double the vertices along a seam, or give each corner a vertex of its
+own. The same map must score the same in every file. So vertices at one place are welded, and rows
+of uv that agree there become one row. Faces without a uv are left out, and the share of the
+surface that is left says so.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 
 SAME_PLACE = 1e-7
-"""Points nearer to one another than this share of the diagonal of their box lie at one place: the
-single precision, in which most writers compute, rounds by about as much."""
+"""Two points are at one place if they are no farther apart than this share of the diagonal of their
+bounding box. Most writers compute in single precision, which rounds by about as much."""
 CROWD = 32
 """Neighbours within the tolerance, on average, that `places` looks at one by one."""
 
@@ -31,12 +31,12 @@ class Scored(NamedTuple):
     """A map as it is scored.
 
     Attributes:
-        mesh: the covered faces, in the order of the whole mesh.
+        mesh: the faces that the map covers, in the order of the whole mesh.
         parameterization: their map.
         reference: another map of the same faces, or None.
-        coverage: share of the 3D area, from 0 to 1, that the map covers (of the faces, where no
-            face has an area).
-        welded: number of vertices that lie where another one does.
+        coverage: the share of the 3D area, from 0 to 1, that the map covers; the share of the
+            number of faces if none has an area.
+        welded: the number of vertices that were welded to another one.
     """
 
     mesh: Mesh
@@ -49,7 +49,7 @@ class Scored(NamedTuple):
 def scored(
     mesh: Mesh, parameterization: Parameterization, reference: Parameterization | None = None
 ) -> Scored:
-    """The covered faces of a map, their vertices welded.
+    """The faces that a map covers, with their vertices welded.
 
     Raises:
         InputError: the map covers no face.
@@ -87,9 +87,10 @@ def places(points: FloatArray, tolerance: float = 0.0) -> IntArray:
 
     Args:
         points: coordinates.
-        tolerance: points whose coordinates differ by no more, directly or through others, lie at
-            one place. Where more than `CROWD` others are so near to a point on average, one point
-            stands for those within half the tolerance, and takes in what is within 1.5 of it.
+        tolerance: two points are at one place if none of their coordinates differ by more than
+            this, or if a chain of such points joins them. Where more than `CROWD`
+            others are so near to a point on average, one point stands for those within half the
+            tolerance, and takes in what is within 1.5 of it.
     """
     order = np.lexsort(points.T)
     ordered = points[order] + 0.0  # no negative zeros
@@ -112,12 +113,12 @@ def places(points: FloatArray, tolerance: float = 0.0) -> IntArray:
 
 
 def same_place(points: FloatArray) -> float:
-    """The tolerance of `places` for (N, k) points: SAME_PLACE of the diagonal of their box."""
+    """The tolerance of `places` for (N, k) points, by SAME_PLACE, in the unit of the points."""
     return SAME_PLACE * math.hypot(*np.ptp(points, axis=0)) if len(points) else 0.0
 
 
 def _joined(parameterization: Parameterization, faces: IntArray) -> Parameterization:
-    """The map with one row of uv for all corners at one vertex of `faces` (F, 3) that agree."""
+    """The map with one row of uv for all corners of `faces` (F, 3) that share a vertex and a uv."""
     uv = parameterization.uv[parameterization.corners.reshape(-1)]
     in_the_plane = places(uv, same_place(uv))
     row = places(np.stack([faces.reshape(-1), in_the_plane], axis=1))

@@ -38,8 +38,6 @@ LIMITS = {"timeout": "time_limit", "out_of_memory": "memory_limit"}
 LIMIT_RAISED = 1.01
 """Ratio to the limit of the earlier run beyond which a limit counts as raised. The memory that a
 machine reports varies a little from day to day."""
-
-
 MACHINE_FAILED = "machine failed"
 """Why a cell runs again that has ended through no fault of its method."""
 
@@ -232,35 +230,20 @@ def _blanks(
     for case in suite.cases:
         for method in chosen:
             for seed in suite.seeds:
-                counted = threads if method.counts_threads else None
-                row_id = identity(
-                    suite=suite.name,
-                    case=case,
-                    method=method.name,
-                    params=method.params,
-                    seed=seed,
-                    source_hash=method.source_hash,
-                    surface_hash=hashes[case],
-                    threads=counted,
-                )
-                if row_id in seen:
-                    continue
-                seen.add(row_id)
-                yield (
-                    method,
-                    ResultRow(
-                        id=row_id,
-                        suite=suite.name,
-                        case=case,
-                        method=method.name,
-                        params=method.params,
-                        seed=seed,
-                        source_hash=method.source_hash,
-                        surface_hash=hashes[case],
-                        status="skipped",
-                        threads=counted,
-                    ),
-                )
+                of_cell: dict[str, Any] = {
+                    "suite": suite.name,
+                    "case": case,
+                    "method": method.name,
+                    "params": method.params,
+                    "seed": seed,
+                    "source_hash": method.source_hash,
+                    "surface_hash": hashes[case],
+                    "threads": threads if method.counts_threads else None,
+                }
+                row_id = identity(**of_cell)
+                if row_id not in seen:
+                    seen.add(row_id)
+                    yield method, ResultRow(id=row_id, status="skipped", **of_cell)
 
 
 def changed(

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from benchmarks.cases.suites import Suite
+from benchmarks.metrics.table import METRICS
 from benchmarks.running import environment, executors, planning, scratch
 from benchmarks.running.planning import Cell, Chosen
 from benchmarks.running.tasks import Executor, MeasureJob, Outcome, RunJob, Task
@@ -50,6 +51,8 @@ class Summary:
         kept: rows of the cells that needed no run.
         missing: the cases whose model could not be had, and how to get each.
         unmeasured: ids of the rows whose metrics could not be computed, and why.
+        metrics: the metrics of each row that has a map, by its id and their names.
+        jobs: how many cells ran at a time.
         seconds: wall time of the run.
         method_seconds: wall time spent in methods, summed over the cells, / jobs.
     """
@@ -61,6 +64,8 @@ class Summary:
     kept: list[ResultRow] = field(default_factory=list)
     missing: dict[str, str] = field(default_factory=dict)
     unmeasured: dict[str, str] = field(default_factory=dict)
+    metrics: dict[str, dict[str, float]] = field(default_factory=dict)
+    jobs: int = 1
     seconds: float = 0.0
     method_seconds: float = 0.0
 
@@ -153,7 +158,7 @@ def run(
     )
     planning.check_readable(cases or (), store)
     memory_limit = _memory_limit(memory, jobs)
-    summary = Summary(suite, chosen)
+    summary = Summary(suite, chosen, jobs=jobs)
     with store.writing(), workers:
         hashes, summary.missing = planning.surfaces(store, suite.cases)
         here = environment.environment()
@@ -209,7 +214,14 @@ def _measure(
         )
         tasks.append(Task(job, began, functools.partial(ended, row)))
     workers.run(tasks, jobs)
-    measuring.metrics(store, values)
+    table = measuring.metrics(store, values)
+    ids = {row.id for row in summary.rows if row.status == "ok"}
+    known = table[table["id"].isin(ids)]
+    records = known[list(METRICS)].to_dict("records")
+    summary.metrics = {
+        row_id: {str(name): float(value) for name, value in record.items()}
+        for row_id, record in zip(known["id"], records, strict=True)
+    }
 
 
 def _job(

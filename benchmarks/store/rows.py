@@ -202,7 +202,7 @@ class RowFile:
             RuntimeError: the file is not held open by `appending()`.
         """
         if self._stream is None:
-            raise RuntimeError("a row is appended inside writing() only")
+            raise RuntimeError("a row is appended inside appending() only")
         line = json.dumps(fields_of(row)).encode() + b"\n"
         before = os.fstat(self._stream).st_size
         with disk_said(self.path):

@@ -48,7 +48,8 @@ def fit(surface: str, out: str, preset: str, as_json: bool, **settings: Any) -> 
     model = estimator_of(preset, settings)
     for stem in ("model", "checkpoint"):
         saving.check_free(Path(out), stem)
-    model = fitted(surface, read_surface(surface), model, checkpoint=out)
+    given = read_surface(surface)
+    model = fitted(surface, given, model, checkpoint=out)
     model.save(out)
     report = {"model": out, "estimator": type(model).__name__, **model.report_}
     print(json.dumps(report) if as_json else f"{out}: {summary(model)}")

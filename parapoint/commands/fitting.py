@@ -11,7 +11,7 @@ import click
 from parapoint.commands.progress import bar
 from parapoint.errors import InputError
 from parapoint.estimator import Estimator
-from parapoint.surfaces.surface import Mesh, Surface
+from parapoint.surfaces.surface import Surface
 
 logger = logging.getLogger("parapoint")
 
@@ -63,35 +63,29 @@ def fitted(
     """
     from parapoint.computed.reconstruction import ReconstructionError
 
-    count = surface.component_count if isinstance(surface, Mesh) else 1
-    if model.components == "together" and count > 1:
-        logger.warning(
-            "%d components: one map is fitted to all of them; --components each or largest "
-            "fits them apart",
-            count,
-        )
     try:
         with bar() as advance:
+
+            def fit(estimator: Estimator) -> Estimator:
+                return estimator.fit(surface, checkpoint=checkpoint, callback=advance)
+
             try:
-                return model.fit(surface, checkpoint=checkpoint, callback=advance)
+                return fit(model)
             except ReconstructionError as error:
+                from parapoint.learned.parapoint import ParaPoint
+
                 logger.warning("no map could be computed, so one is trained: %s", error)
-                return _trained_instead(model).fit(surface, checkpoint=checkpoint, callback=advance)
+                stand_in = ParaPoint(
+                    "learned",
+                    time_budget=model.time_budget or FALLBACK_SECONDS,
+                    components=model.components,
+                    seed=model.seed,
+                )
+                return fit(stand_in)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     except RuntimeError as error:  # the training diverged
         raise click.ClickException(f"{path}: {error}") from error
-
-
-def _trained_instead(model: Estimator) -> Estimator:
-    from parapoint.learned.parapoint import ParaPoint
-
-    return ParaPoint(
-        "learned",
-        time_budget=model.time_budget or FALLBACK_SECONDS,
-        components=model.components,
-        seed=model.seed,
-    )
 
 
 def summary(model: Estimator) -> str:

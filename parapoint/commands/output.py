@@ -12,9 +12,9 @@ from parapoint.estimator import Estimator
 from parapoint.files.mesh_writers import write_npz, write_ply, write_textured
 from parapoint.files.point_writers import write_points
 from parapoint.files.targets import beside, checked_picture, checked_target
+from parapoint.surfaces.across_seams import Transform, edges_across_seam, opened
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.sampling import mean_spacing
-from parapoint.surfaces.spanning import Transform, opened, spanning_edges
 from parapoint.surfaces.strays import NAMED, far_from, named, unmapped
 from parapoint.surfaces.surface import BoolArray, Mesh, Surface
 from parapoint.textures.baking import MARGIN, baked
@@ -95,8 +95,8 @@ def write(
         transform = _then(model.fitted_.flatten, placing)
         uv = transform(points)
         _warn_of_far(out, far_from(model.points_, points) & surface.referenced)
-        spans = spanning_edges(surface, uv, transform, mean_spacing(model.points_))
-        parameterization = opened(surface, uv, spans)
+        across = edges_across_seam(surface, uv, transform, mean_spacing(model.points_))
+        parameterization = opened(surface, uv, across)
         facts["spanning_faces"] = int((parameterization.corners != surface.faces).any(1).sum())
         shown = Charted(surface, parameterization)
         if ending == ".npz":

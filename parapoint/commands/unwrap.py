@@ -12,9 +12,8 @@ from parapoint.commands.memory import memory_option
 from parapoint.commands.output import TEXTURE, preview_target, target, write
 from parapoint.errors import InputError
 from parapoint.files.reading import Polygons, read_polygons
-from parapoint.fitting import COMPONENTS
 from parapoint.parameters import check_choice
-from parapoint.surfaces.components import components
+from parapoint.surfaces.components import COMPONENTS, components
 from parapoint.textures.baking import check_size
 
 

@@ -15,7 +15,7 @@ import time
 import igl
 import numpy as np
 
-from parapoint.planar.embedding import FLATTEST, tutte
+from parapoint.planar.embedding import FLATTEST, embedded_in_disk
 from parapoint.planar.scaffold import EXACT, LEAST_GAIN, descended, excess, of_area_one
 from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.surface import FloatArray, Mesh
@@ -80,7 +80,7 @@ def _embedded(mesh: Mesh) -> tuple[Mesh, FloatArray]:
     mesh = of_area_one(mesh.vertices, mesh.faces)
     if not mesh.face_areas.min() > FLATTEST:
         raise BijectionError("a face has no area")
-    uv = tutte(mesh)
+    uv = embedded_in_disk(mesh)
     areas = signed_areas(uv, mesh.faces)
     if not (np.isfinite(uv).all() and areas.min() > FLATTEST):
         raise BijectionError("its embedding in the disk has flat triangles")

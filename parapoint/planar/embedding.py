@@ -20,7 +20,7 @@ MOST_OPENINGS = 50
 """Cuts at most to what Tutte's embedding flattens; one to three were needed where any was."""
 
 
-def tutte(mesh: Mesh) -> FloatArray:
+def embedded_in_disk(mesh: Mesh) -> FloatArray:
     """(V, 2) Tutte's embedding in the unit disk, the longest loop on the circle.
 
     All other vertices are at the mean of their neighbours; each inner loop is filled with a fan
@@ -57,7 +57,7 @@ def embeddable(mesh: Mesh) -> Mesh:
     for numbers, or to the hole, brings this to the rim of the disk.
     """
     for _ in range(MOST_OPENINGS):
-        flat = ~(signed_areas(tutte(mesh), mesh.faces) > FLATTEST)
+        flat = ~(signed_areas(embedded_in_disk(mesh), mesh.faces) > FLATTEST)
         if not flat.any():
             break
         loops = mesh.boundary_loops

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
@@ -10,6 +12,9 @@ from scipy.spatial import cKDTree
 from parapoint.surfaces.scan_lines import breadth
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, PointCloud, Surface
 
+COMPONENTS = ("together", "each", "largest")
+"""What the parameter `components` of a fit may say: one map of the whole surface, one of each
+component, or one of the largest component alone."""
 NEIGHBOURS = 8
 """Points joined to each point of a cloud. It needs no length, so uneven density is no matter; and
 more than so many points that are nearer to each other than to all others stand apart."""
@@ -17,6 +22,30 @@ FEWEST = 100
 """Points of a component of a cloud; smaller ones go with the nearest that is larger."""
 SAMPLE = 200_000
 """Most points of a cloud among which components are looked for; the others go with the nearest."""
+
+logger = logging.getLogger("parapoint")
+
+
+def parts_of(surface: Surface, which: str) -> list[Surface]:
+    """The parts of a surface that get a map each, as COMPONENTS says; a warning tells of several.
+
+    Args:
+        surface: a mesh or a cloud.
+        which: one of COMPONENTS.
+    """
+    if which == "together":
+        if isinstance(surface, Mesh) and surface.component_count > 1:
+            logger.warning(
+                "%d components: one map is fitted to all of them; --components each or largest "
+                "fits them apart",
+                surface.component_count,
+            )
+        return [surface]
+    parts = components(surface)
+    if len(parts) > 1:
+        done = "the largest is fitted" if which == "largest" else "each is fitted"
+        logger.warning("%d components: %s", len(parts), done)
+    return parts[:1] if which == "largest" else parts
 
 
 def components(surface: Surface) -> list[Surface]:

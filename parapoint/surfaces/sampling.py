@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import logging
-
 import numpy as np
 from scipy import sparse
 from scipy.spatial import ConvexHull, QhullError, cKDTree
@@ -11,8 +9,6 @@ from scipy.spatial import ConvexHull, QhullError, cKDTree
 from parapoint.errors import InputError
 from parapoint.surfaces.frame import power_of_two
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, Surface, edge_table
-
-logger = logging.getLogger("parapoint")
 
 FEWEST_POINTS = 100
 """Distinct points that a fit needs."""
@@ -30,8 +26,6 @@ CANDIDATES = 6
 PACKED = 0.66
 """Least distance of a point on a face from all others, over the root of the mean area of a point:
 some 1.15 times as many as are asked for would fit."""
-MOST_COMPARED = 1_000_000
-"""Rows of a cloud among which repetitions are counted."""
 
 
 def training_points(surface: Surface, count: int, seed: int) -> FloatArray:
@@ -73,18 +67,6 @@ def without_coincident(cloud: FloatArray) -> FloatArray:
     """(M, 3) the points (N, 3) of a cloud in its frame, without those that coincide with others."""
     _, rows = np.unique(np.round(cloud / COINCIDENT), axis=0, return_index=True)
     return cloud[np.sort(rows)]
-
-
-def rows_left_out(surface: Surface) -> dict[str, object]:
-    """How many rows of a cloud were not finite, and how many repeat others (of a million)."""
-    if isinstance(surface, Mesh):
-        return {"dropped_not_finite": 0, "dropped_duplicates": 0}
-    points = surface.points[:MOST_COMPARED]
-    ordered = points[np.lexsort(points.T)]
-    repeated = int((ordered[1:] == ordered[:-1]).all(axis=1).sum())
-    if repeated:
-        logger.warning("%d of %d points repeat others and count once", repeated, len(points))
-    return {"dropped_not_finite": surface.dropped, "dropped_duplicates": repeated}
 
 
 def _is_coarse(mesh: Mesh) -> bool:

@@ -1,14 +1,19 @@
-"""Stray points: rows of a cloud far from everything else, as flying pixels and no-data rows are."""
+"""Rows of a cloud that no map is fitted to: not finite, repeated, or stray.
+
+Stray points lie far from everything else, as flying pixels and no-data rows do.
+"""
 
 from __future__ import annotations
 
 import logging
 
 import numpy as np
+import numpy.typing as npt
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from parapoint.errors import InputError
 from parapoint.surfaces.frame import Frame
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh, PointCloud, Surface
 
@@ -33,8 +38,49 @@ LARGEST = 1e12
 
 NAMED = 10
 """Stray rows that are named one by one."""
+MOST_COMPARED = 1_000_000
+"""Rows of a cloud among which repetitions are counted."""
 
 logger = logging.getLogger("parapoint")
+
+
+def fitted_rows(given: npt.ArrayLike | Surface) -> tuple[Surface, dict[str, object]]:
+    """The surface without the rows that no map is fitted to, and how many those are, as facts.
+
+    A mesh stays as it is. Repeated rows stay too: the draw of points takes one of them.
+
+    Args:
+        given: a mesh, a cloud, or the (n, 3) points of one.
+
+    Raises:
+        InputError: the array has another shape, or no finite row.
+    """
+    surface = given if isinstance(given, Mesh | PointCloud) else _finite(given)
+    surface, strays = without_strays(surface)
+    if isinstance(surface, Mesh):
+        return surface, {"dropped_not_finite": 0, "dropped_duplicates": 0}
+    points = surface.points[:MOST_COMPARED]
+    ordered = points[np.lexsort(points.T)]
+    repeated = int((ordered[1:] == ordered[:-1]).all(axis=1).sum())
+    if repeated:
+        logger.warning("%d of %d points repeat others and count once", repeated, len(points))
+    return surface, {
+        "dropped_not_finite": surface.dropped,
+        "dropped_duplicates": repeated,
+        **strays,
+    }
+
+
+def _finite(given: npt.ArrayLike) -> PointCloud:
+    """The cloud of the finite rows of an array; the number of others is logged."""
+    points = np.asarray(given, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise InputError(f"points must have shape (n, 3), not {points.shape}")
+    finite = np.isfinite(points).all(axis=1)
+    dropped = int((~finite).sum())
+    if dropped:
+        logger.warning("dropped %d of %d points: not finite", dropped, len(points))
+    return PointCloud(points[finite], dropped=dropped)
 
 
 def without_strays(surface: Surface) -> tuple[Surface, dict[str, object]]:

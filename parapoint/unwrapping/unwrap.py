@@ -18,12 +18,12 @@ from parapoint.planar.descent import LEAST_ENERGY, Run, sound
 from parapoint.planar.domains import FlatteningError
 from parapoint.planar.embedding import embeddable
 from parapoint.planar.growth import PRICE, grown
+from parapoint.surfaces.across_seams import learned_seam, unfolded
 from parapoint.surfaces.areas import MOST_STARVED, starved_share
 from parapoint.surfaces.cutting import cut_along, disk_cut, edge_lengths
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.preparation import prepared
 from parapoint.surfaces.sampling import FEWEST_VERTICES
-from parapoint.surfaces.spanning import learned_seam, unfolded
 from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, Surface
 
 POINTS_OF_A_FACE = 100
@@ -38,11 +38,11 @@ class Unwrap:
     """An isometric map of the mesh, cut along the seams of the computed map; no flips, one to one.
 
     `ComputedMap` maps the vertices; along its seam, made a clean path of edges
-    (`parapoint.surfaces.spanning`), the mesh is cut. The symmetric Dirichlet energy is brought down
-    from Tutte's embedding, or from the computed map where that has less and is one to one on the
-    cut mesh; the boundary never crosses itself (`parapoint.planar.scaffold`). Then the seam grows
-    to where the map is most distorted (`parapoint.planar.growth`), as long as that pays, and on
-    until hardly a place is starved of area and a bound on the energy is met.
+    (`parapoint.surfaces.across_seams`), the mesh is cut. The symmetric Dirichlet energy is brought
+    down from Tutte's embedding, or from the computed map where that has less and is one to one on
+    the cut mesh; the boundary never crosses itself (`parapoint.planar.scaffold`). Then the seam
+    grows to where the map is most distorted (`parapoint.planar.growth`), as long as that pays, and
+    on until hardly a place is starved of area and a bound on the energy is met.
 
     Where no map can be computed, the automatic cut (`parapoint.surfaces.cutting`) stands for it.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import shlex
 from collections import Counter
@@ -14,6 +15,7 @@ from typing import Any
 from PIL import Image
 
 from benchmarks.cases.suites import SUITES
+from benchmarks.running import planning
 from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
 from parapoint.surfaces.surface import Mesh
@@ -318,15 +320,30 @@ class Section:
         return "The model could not be had."
 
     @property
+    def suite_command(self) -> str:
+        """The command that runs the whole suite; "" for one of the user's own, which has no name.
+
+        As the other commands, it goes on in the folder that the report was made from.
+        """
+        if self.name not in SUITES:
+            return ""
+        return shlex.join(["nox", "-s", "bench", "--", self.name, "--out", str(self.results)])
+
+    @property
+    def results(self) -> Path:
+        """The folder that the report was made from."""
+        return self.report.parent
+
+    @property
     def command(self) -> str:
-        """The command that runs the cells again; a suite of the user's own has no name for it."""
+        """The command that runs the cells again, with the methods unless they are the suite's."""
         seeds = ",".join(str(seed) for seed in sorted({row.seed for row in self.contents.rows}))
         cases = ",".join(self.contents.cases)
-        named = [self.name]
-        if self.name not in SUITES:
-            named = ["--methods", ",".join(map(_spec, self.contents.methods))]
+        named = [self.name] if self.name in SUITES else []
+        if _methods_of(self.name) != {(one.method, one.params) for one in self.contents.methods}:
+            named += ["--methods", ",".join(map(_spec, self.contents.methods))]
         run = ["python", "-m", "benchmarks", "run", *named]
-        return shlex.join([*run, "--cases", cases, "--seeds", seeds])
+        return shlex.join([*run, "--cases", cases, "--seeds", seeds, "--out", str(self.results)])
 
     @property
     def runs(self) -> list[dict[str, str]]:
@@ -341,6 +358,14 @@ class Section:
             for number, entry in enumerate(entries)
             if number in used and isinstance(entry, Mapping)
         ]
+
+
+def _methods_of(suite: str) -> set[tuple[str, str]]:
+    """Name and parameters of each method that a suite names; none for a suite of a user's own."""
+    if suite not in SUITES:
+        return set()
+    _, chosen = planning.choice(SUITES[suite], None, (), None, ())
+    return {(method.name, json.dumps(method.params, sort_keys=True)) for method in chosen}
 
 
 def _spec(label: Label) -> str:

@@ -25,6 +25,7 @@ from reports.pictures import clouds
 from reports.pictures.names import ARTIST_PICTURES, map_file, map_kinds, model_file, model_kinds
 from reports.pictures.portraits import Portrait, save
 from reports.pictures.workers import done_by_several
+from reports.progress import QUIET, Progress
 
 SIZE, SMALL = 360, 280
 """Longer side of a picture in pixels: what the largest figure of a model prints, and enough for the
@@ -32,10 +33,10 @@ others, of reports with too many models for such figures.
 """
 
 
-def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
+def draw(contents: Contents, folder: Path, jobs: int, progress: Progress = QUIET) -> list[str]:
     """Draw the pictures of the suite that `folder` lacks; what could not be drawn, and why.
 
-    `jobs` processes share the models.
+    `jobs` processes share the models; `progress` hears of each.
     """
     folder.mkdir(parents=True, exist_ok=True)
     record = folder / "keys.json"
@@ -72,7 +73,8 @@ def draw(contents: Contents, folder: Path, jobs: int) -> list[str]:
     wanting = itertools.chain.from_iterable(missing for _, missing in work)
     done = {name: keys[name] for name in keys.keys() - set(wanting)}
     make = partial(draw_model, contents.store.folder, folder, with_heat)
-    made = done_by_several(make, work, jobs)
+    parts = done_by_several(make, work, jobs)
+    made = progress.track(parts, f"{contents.suite}: pictures of models", len(work))
     for (_, missing), (failed, said) in zip(work, made, strict=True):
         faults += said
         done |= {name: keys[name] for name in set(missing).difference(failed)}

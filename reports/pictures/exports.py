@@ -23,6 +23,7 @@ from parapoint.textures.checkerboard import checkerboard
 from reports.contents import Contents
 from reports.pictures.drawing import known_keys
 from reports.pictures.names import slug
+from reports.progress import QUIET, Progress
 
 KINDS = ("obj", "glb")
 
@@ -41,14 +42,15 @@ def written(report: Path, row: ResultRow) -> dict[str, str]:
     }
 
 
-def write(contents: Contents, report: Path) -> list[str]:
+def write(contents: Contents, report: Path, progress: Progress = QUIET) -> list[str]:
     """Write the exports of the suite that are not there yet; what could not be, and why."""
     record = report / "exports" / slug(contents.suite) / "keys.json"
     record.parent.mkdir(parents=True, exist_ok=True)
     known = known_keys(record)
     source = source_hash(__name__)
     keys, faults = {}, []
-    for row in contents.rows:
+    rows = progress.track(contents.rows, f"{contents.suite}: exports", len(contents.rows))
+    for row in rows:
         if row.status != "ok":
             continue
         text = f"{source} {row.surface_hash} {row.uv_sha256}"

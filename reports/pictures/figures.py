@@ -52,6 +52,7 @@ from reports.pictures.plots import (
 )
 from reports.pictures.style import DARK_PAPER, STYLE, darken
 from reports.pictures.workers import done_by_several
+from reports.progress import QUIET, Progress
 from reports.tables.published import published_values
 
 
@@ -319,10 +320,13 @@ class Drawn:
     caption: str
 
 
-def draw(contents: Contents, pictures: Path, folder: Path, jobs: int) -> list[Drawn]:
+def draw(
+    contents: Contents, pictures: Path, folder: Path, jobs: int, progress: Progress = QUIET
+) -> list[Drawn]:
     """Write the figures of a suite into `folder` as PDF and PNG, those that have changed.
 
-    `captions.md` beside them says what each shows; `jobs` processes share the work.
+    `captions.md` beside them says what each shows; `jobs` processes share the work, and
+    `progress` hears of it.
     """
     folder.mkdir(parents=True, exist_ok=True)
     record = folder / "keys.json"
@@ -337,7 +341,8 @@ def draw(contents: Contents, pictures: Path, folder: Path, jobs: int) -> list[Dr
         if known.get(drawing.name) != keys[drawing.name]:
             changed.append(drawing)
     make = partial(write, folder, contents.is_large)
-    list(done_by_several(make, [(drawing,) for drawing in changed], jobs))
+    made = done_by_several(make, [(drawing,) for drawing in changed], jobs)
+    list(progress.track(made, f"{contents.suite}: figures", len(changed)))
     record.write_text(json.dumps(keys, indent=0, sort_keys=True) + "\n")
     for name in known.keys() - keys.keys():  # of a folder that grew
         for ending in ENDINGS:

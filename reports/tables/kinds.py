@@ -21,7 +21,7 @@ from reports.means import common_cases, common_values, statistic
 from reports.ranking import TIMES
 from reports.tables.notes import environment_note, failure_notes, legend, load_notes, method_notes
 from reports.tables.published import model
-from reports.tables.table import SHORT, Column, Table, Value, metric_column
+from reports.tables.table import DONE, METHOD, Column, Table, Value, metric_column, short_columns
 
 
 def kind(contents: Contents, case: str) -> str:
@@ -64,13 +64,15 @@ def success(contents: Contents) -> Table:
             usable = sum(record["grade"] == "usable" for record in own)
             row[f"{name} usable"] = _share(usable, len(own))
         rows.append(row)
-    columns = [Column("method", "Method", text=True)]
+    columns = [METHOD]
     for name, cases in groups.items():
-        columns.append(Column(f"{name} usable", "usable", text=True, group=f"{name}: {len(cases)}"))
-        columns.append(Column(f"{name} ok", "ok", text=True, group=f"{name}: {len(cases)}"))
-        if not contents.clouds.issuperset(cases):
-            one = Column(f"{name} {BIJECTIVE}", "1 to 1", text=True, group=f"{name}: {len(cases)}")
-            columns.append(one)
+        shown = {"usable": "usable", "ok": "ok", BIJECTIVE: "1 to 1"}
+        if contents.clouds.issuperset(cases):
+            del shown[BIJECTIVE]
+        columns += [
+            Column(f"{name} {key}", title, text=True, group=f"{name}: {len(cases)}")
+            for key, title in shown.items()
+        ]
     return Table(
         name="success",
         title="Success by kind of surface",
@@ -135,9 +137,9 @@ def means_by_kind(contents: Contents) -> Table:
         ),
         columns=(
             Column("kind", "Surface", text=True, once=True),
-            Column("method", "Method", text=True),
-            *(metric_column(name, SHORT.get(name, "")) for name in names),
-            Column("done", "ok", text=True),
+            METHOD,
+            *short_columns(names),
+            DONE,
         ),
         blocks=tuple(blocks),
         set_apart=contents.atlases,

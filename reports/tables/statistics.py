@@ -12,7 +12,7 @@ from scipy import stats
 
 from reports.contents import ANGLE, AREA, Contents, Label, number
 from reports.tables.notes import environment_note, failure_notes, method_notes
-from reports.tables.table import Column, Table, Value
+from reports.tables.table import CASE, DONE, METHOD, Column, Table, Value
 
 Floats = npt.NDArray[np.float64]
 
@@ -175,9 +175,9 @@ def seed_variance(contents: Contents) -> Table | None:
     if not blocks:
         return None
     columns = [
-        Column("case", "Model", text=True, once=True),
-        Column("method", "Method", text=True),
-        Column("done", "ok", text=True),
+        CASE,
+        METHOD,
+        DONE,
         Column("maps", "different maps", digits=0),
     ]
     for name, title, digits in (*names, ("seconds", "Time [s]", 1)):

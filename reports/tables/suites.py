@@ -32,7 +32,16 @@ from reports.tables.notes import (
 )
 from reports.tables.published import AUTHORS, Verdict, claim_text, published_values, verdicts
 from reports.tables.statistics import paired_tests, seed_variance
-from reports.tables.table import Column, Table, Value, metric_column, metric_title
+from reports.tables.table import (
+    CASE,
+    DONE,
+    METHOD,
+    Column,
+    Table,
+    Value,
+    metric_column,
+    metric_title,
+)
 from reports.tables.variants import ablation, cuts
 
 SUMMARY_METRICS = (
@@ -136,8 +145,8 @@ def supplement(contents: Contents) -> Table | None:
     without = f"{ANGLE}_without_spanning"
     area_without = f"{AREA}_without_spanning"
     columns = [
-        Column("case", "Model", text=True, once=True),
-        Column("method", "Method", text=True),
+        CASE,
+        METHOD,
         Column("grade", "Grade", text=True),
         metric_column(ANGLE, "all faces", group="Angle difference [rad]"),
         metric_column(without, "no spanning", group="Angle difference [rad]"),
@@ -150,7 +159,7 @@ def supplement(contents: Contents) -> Table | None:
         Column("seam_length", "seam", digits=2),
         metric_column("seconds", "wall", group="Time [s]"),
         metric_column("cpu_seconds", "processor", group="Time [s]"),
-        Column("done", "ok", text=True),
+        DONE,
     ]
     authors = [
         author
@@ -269,7 +278,7 @@ def comparison(contents: Contents, names: Sequence[str] = ()) -> Table:
         ),
         columns=(
             Column("metric", "Metric", text=True, once=True),
-            Column("method", "Method", text=True),
+            METHOD,
             Column("mean", "mean", by_row=True),
             Column("median", "median", by_row=True),
             Column("worst", "worst", by_row=True),
@@ -317,9 +326,9 @@ def against_published(contents: Contents) -> Table | None:
             "verdict is given only where our file is, or likely is, the authors' own model."
         ),
         columns=(
-            Column("case", "Model", text=True, once=True),
+            CASE,
             Column("claim", "Our file is", text=True, once=True),
-            Column("method", "Method", text=True),
+            METHOD,
             Column("measured", "measured", digits=4),
             Column("published", "published"),
             Column("difference", "difference"),
@@ -353,7 +362,7 @@ def failures(contents: Contents) -> Table | None:
         caption="A method skips a surface that it knows beforehand that it cannot take.",
         columns=(
             Column("case", "Model", text=True),
-            Column("method", "Method", text=True),
+            METHOD,
             Column("seed", "seed", digits=0),
             Column("status", "status", text=True),
             Column("reason", "reason", text=True),
@@ -383,7 +392,7 @@ def everything(contents: Contents) -> Table:
         caption="Every metric of every cell.",
         columns=(
             Column("case", "Model", text=True),
-            Column("method", "Method", text=True),
+            METHOD,
             Column("seed", "seed", digits=0),
             Column("status", "status", text=True),
             *(metric_column(name) for name in names),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -192,6 +192,12 @@ def grouped(columns: Sequence[Column]) -> list[tuple[str, int]]:
     return groups
 
 
+CASE = Column("case", "Model", text=True, once=True)
+"""The column of the model, which blocks of rows name once."""
+METHOD = Column("method", "Method", text=True)
+"""The column of the method."""
+DONE = Column("done", "ok", text=True)
+"""The column that counts the seeds that gave a map."""
 TIME_TITLES = {"seconds": "time [s]", "cpu_seconds": "processor time [s]"}
 
 
@@ -215,6 +221,11 @@ def metric_column(name: str, title: str = "", **given: Any) -> Column:
         tie=tolerance(name),
     )
     return replace(column, **given)
+
+
+def short_columns(names: Iterable[str]) -> list[Column]:
+    """The columns of metrics under their titles of SHORT, where they have one."""
+    return [metric_column(name, SHORT.get(name, "")) for name in names]
 
 
 def metric_title(name: str) -> str:

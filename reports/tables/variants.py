@@ -17,7 +17,7 @@ from reports.contents import (
     number,
 )
 from reports.tables.notes import environment_note, failure_notes, legend, method_notes
-from reports.tables.table import SHORT, Column, Table, Value, metric_column
+from reports.tables.table import CASE, DONE, METHOD, Column, Table, Value, short_columns
 
 
 def ablation(contents: Contents) -> Table | None:
@@ -33,10 +33,10 @@ def ablation(contents: Contents) -> Table | None:
             "gave a map. A low distortion is worth nothing where many faces overlap or are flipped."
         ),
         columns=(
-            Column("case", "Model", text=True, once=True),
+            CASE,
             Column("method", "Variant", text=True),
-            *(metric_column(name, SHORT.get(name, "")) for name in names),
-            Column("done", "ok", text=True),
+            *short_columns(names),
+            DONE,
         ),
         blocks=tuple(_block(contents, case, names) for case in contents.cases),
         notes=(legend(contents), *failure_notes(contents), environment_note(contents)),
@@ -90,12 +90,12 @@ def cuts(contents: Contents) -> Table | None:
             "several seeds, the share of them."
         ),
         columns=(
-            Column("case", "Model", text=True, once=True),
-            Column("method", "Method", text=True),
+            CASE,
+            METHOD,
             Column("cut", "Cut", text=True),
-            *(metric_column(name, SHORT.get(name, "")) for name in names),
+            *short_columns(names),
             Column(BIJECTIVE, "bijective", text=True),
-            Column("done", "ok", text=True),
+            DONE,
         ),
         blocks=tuple(blocks),
         set_apart=contents.atlases.union(lengths),

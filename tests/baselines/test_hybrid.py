@@ -13,11 +13,11 @@ from parapoint.method import UnsupportedError
 from parapoint.planar.crossing import crossing_vertices
 from parapoint.planar.descent import Run
 from parapoint.planar.growth import grown
+from parapoint.surfaces.across_seams import learned_seam, unfolded
 from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.cutting import cut_along, cut_to_disk, disk_cut, edge_lengths
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.preparation import prepared
-from parapoint.surfaces.spanning import learned_seam, unfolded
 from parapoint.surfaces.surface import Mesh
 from parapoint.testing import irregular_disk, sphere
 

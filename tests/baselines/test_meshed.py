@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from baselines import registry
-from baselines.meshed import carried
+from baselines.meshed import _near, carried
 from parapoint.method import UnsupportedError
 from parapoint.planar.domains import FlatteningError
 from parapoint.surfaces.parameterization import Parameterization
@@ -95,3 +95,11 @@ def test_a_face_without_area_gives_the_uv_of_its_nearest_corner():
     flat = Parameterization(np.array([[0, 0], [3, 0], [7, 1.0]]), [[0, 1, 2]])
     images, _ = carried(np.array([[2.1, 0, 0], [0.9, 0, 0.0]]), mesh, flat)
     assert_allclose(images, [[7, 1], [3, 0]])
+
+
+def test_the_surface_ends_four_spacings_from_the_points():
+    """The spacing inside a square grid of side 1 is the mean of 1, four times, and √2, twice."""
+    points = np.stack([*np.meshgrid(np.arange(9.0), np.arange(9.0)), np.zeros((9, 9))], axis=2)
+    reach = 4 * (4 + 2 * np.sqrt(2)) / 6
+    vertices = np.array([[4, 4, 0.99 * reach], [4, 4, 1.01 * reach], [4, 4, -0.99 * reach]])
+    assert_array_equal(_near(vertices, points.reshape(-1, 3)), [True, False, True])

@@ -178,29 +178,32 @@ def test_a_run_goes_from_a_file_and_a_plugin_to_a_checked_folder(
     shown = capsys.readouterr()
     assert "custom: 2 cells to run (2 new)" in shown.out
     assert f"mesh.off, {name}(height=1.0): failed: ValueError: too high" in shown.out
-    assert shown.err == ""
-    rows = {row.method: row for row in Store("results").rows()}
+    assert "[1/2] mesh.off tutte: ok, " in shown.err
+    assert f"[2/2] mesh.off {name}(height=1.0): failed: ValueError: too high" in shown.err
+    assert "results: results/custom   report: python -m reports results/custom" in shown.out
+    folder = tmp_path / "results" / "custom"
+    rows = {row.method: row for row in Store(folder).rows()}
     assert rows["tutte"].case == "mesh.off"
     assert rows["tutte"].suite == "custom"
     assert rows[name].params == {"height": 1.0}
-    assert (tmp_path / "results" / "metrics.parquet").is_file()
+    assert (folder / "metrics.parquet").is_file()
 
     assert command(*arguments, "--strict") == 1
     assert "custom: 0 cells to run; 2 are done already" in capsys.readouterr().out
 
-    Store("results").uv_path(rows["tutte"].id).unlink()
+    Store(folder).uv_path(rows["tutte"].id).unlink()
     assert command(*arguments) == 0
     shown = capsys.readouterr()
     assert "custom: 1 cells to run (1 map missing); 1 are done already" in shown.out
     assert "again: mesh.off, tutte, seed 0: map missing" in shown.out
 
-    assert command("check", "results") == 0
+    assert command("check", "results/custom") == 0
     assert "2 cells, 1 maps: no faults" in capsys.readouterr().out
-    store = Store("results")
+    store = Store(folder)
     result = store.result(rows["tutte"])
     changed = map_arrays(result) | {"uv": np.asarray(result.uv) * 2}
     write_arrays(store.uv_path(rows["tutte"].id), changed)
-    assert command("check", "results") == 1
+    assert command("check", "results/custom") == 1
     assert "is not the map that was written" in capsys.readouterr().out
 
 

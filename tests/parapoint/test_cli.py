@@ -5,7 +5,7 @@ import pytest
 
 from parapoint import InputError, Mesh, ParaPoint, cli
 from parapoint.files import reading as files
-from parapoint.surfaces.spanning import MOST_PIECES, opened, spanning_edges
+from parapoint.surfaces.across_seams import MOST_PIECES, edges_across_seam, opened
 from parapoint.testing import irregular_disk
 from parapoint.textures.checkerboard import checkerboard
 
@@ -142,10 +142,10 @@ def strip() -> tuple[Mesh, np.ndarray]:
     return Mesh(np.stack([x, y, 0 * x], axis=1), faces), uv
 
 
-def test_spanning_edges_are_those_across_the_tear() -> None:
+def test_edges_across_the_seam_are_those_across_the_tear() -> None:
     mesh, uv = strip()
     across = np.isclose(mesh.vertices[mesh.edges][:, :, 0].sum(axis=1), 21)
-    assert np.array_equal(spanning_edges(mesh, uv), across)
+    assert np.array_equal(edges_across_seam(mesh, uv), across)
     assert across.sum() == 5  # three straight ones and two diagonals
 
 
@@ -160,9 +160,9 @@ def test_a_long_edge_is_seen_to_cross_the_seam_twice() -> None:
 
     uv = transform(mesh.vertices)
     assert np.array_equal(uv, mesh.vertices[:, :2])
-    assert not spanning_edges(mesh, uv).any()
+    assert not edges_across_seam(mesh, uv).any()
     across = np.isclose(np.sort(mesh.vertices[mesh.edges][:, :, 0], axis=1), [0, 9]).all(axis=1)
-    assert np.array_equal(spanning_edges(mesh, uv, transform, 0.5), across)
+    assert np.array_equal(edges_across_seam(mesh, uv, transform, 0.5), across)
     assert across.sum() == 3
 
 
@@ -174,13 +174,13 @@ def test_a_mesh_far_larger_than_the_spacing_is_divided_no_further_than_can_be_ma
         seen.append(len(points))
         return points[:, :2]
 
-    spanning_edges(mesh, uv, transform, 1e-12)
+    edges_across_seam(mesh, uv, transform, 1e-12)
     assert sum(seen) <= MOST_PIECES + 2 * len(mesh.edges)
 
 
-def test_a_face_that_spans_the_seam_keeps_its_shape_at_one_bank() -> None:
+def test_a_face_across_the_seam_keeps_its_shape_on_one_side() -> None:
     mesh, uv = strip()
-    result = opened(mesh, uv, spanning_edges(mesh, uv))
+    result = opened(mesh, uv, edges_across_seam(mesh, uv))
     images, real = result.uv[result.corners], mesh.vertices[mesh.faces][:, :, :2]
     # The map is an isometry on each side, so every face now has its own shape.
     sides = np.roll(images, -1, axis=1) - images
@@ -194,15 +194,15 @@ def test_a_face_that_spans_the_seam_keeps_its_shape_at_one_bank() -> None:
     assert len(result.seams(mesh)) == 3  # two of the five edges across are on the boundary
 
 
-def test_a_face_of_three_spanning_edges_becomes_a_chart() -> None:
+def test_a_face_of_three_edges_across_the_seam_becomes_a_chart() -> None:
     mesh, _ = strip()
     x, y = mesh.vertices[:, 0], mesh.vertices[:, 1]
     uv = mesh.vertices[:, :2].copy()
     uv[(x > 10) & (y < 2)] += [300, 0]
     uv[(x > 10) & (y == 2)] += [0, 500]
-    spans = spanning_edges(mesh, uv)[mesh.edge_of_halfedge].reshape(-1, 3)
+    spans = edges_across_seam(mesh, uv)[mesh.edge_of_halfedge].reshape(-1, 3)
     assert spans.all(axis=1).sum() == 1  # where the three parts meet
-    result = opened(mesh, uv, spanning_edges(mesh, uv))
+    result = opened(mesh, uv, edges_across_seam(mesh, uv))
     corners = result.corners[spans.all(axis=1)][0]
     assert not set(corners) & set(range(63))
     a, b, c = result.uv[corners]
@@ -213,7 +213,7 @@ def test_a_face_of_three_spanning_edges_becomes_a_chart() -> None:
 def test_a_map_without_a_seam_stays_as_it_is() -> None:
     mesh, _ = strip()
     uv = mesh.vertices[:, :2]
-    result = opened(mesh, uv, spanning_edges(mesh, uv))
+    result = opened(mesh, uv, edges_across_seam(mesh, uv))
     assert np.array_equal(result.corners, mesh.faces)
 
 

@@ -48,3 +48,12 @@ def test_a_bug_is_not_dressed_up_as_bad_input():
 def test_light_imports_leave_torch_out(module):
     code = f"import sys, {module}; sys.exit('torch' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_text_from_elsewhere_is_shown_as_text_alone() -> None:
+    assert console.printable("Fläche 3 → uv") == "Fläche 3 → uv"
+    assert console.printable("a\x1b[31mb\u202ec\n\ud800") == r"a\x1b[31mb\u202ec\n\ud800"
+    assert console.printable("abcdef", longest=6) == "abcdef"
+    cut = [console.printable(text, longest=6) for text in ("abcdefg", "abcdefh")]
+    assert all(text.startswith("abcdef… (") and len(text) == 16 for text in cut)
+    assert cut[0] != cut[1]

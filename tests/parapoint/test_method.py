@@ -26,6 +26,11 @@ CLOUD = PointCloud(TETRAHEDRON.vertices)
         ("disk_after_cut", CLOUD, "needs faces; the surface is a point cloud"),
         ("faces", TETRAHEDRON, None),
         ("disk", DISK, None),
+        ("seams", TETRAHEDRON, "needs a mesh that came with a UV map, for its seams"),
+        ("seams", Mesh(TETRAHEDRON.vertices, TETRAHEDRON.faces, [[0, 1]]), None),
+        ("seams", CLOUD, "needs a mesh that came with a UV map, for its seams"),
+        ("points", CLOUD, None),
+        ("points", DISK, "takes a point cloud; the surface is a mesh"),
     ],
 )
 def test_requirements_name_their_reason(word, surface, reason):

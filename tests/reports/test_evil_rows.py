@@ -149,11 +149,21 @@ def test_the_command_of_a_suite_of_the_user_s_own_runs_its_cells(tmp_path: Path)
         for method, given in (("slim", params), ("lscm", {})):
             row = writer.cell("a file.off", sheet(), method, given, status="failed", reason="no")
             writer.store.append(dataclasses.replace(row, id=row.id[::-1], suite="custom"))
-    named, custom = (Section(tmp_path, one, (), (), ()).command for one in contents(tmp_path))
-    assert named == "python -m benchmarks run paper --cases 'a file.off' --seeds 0"
-    words = shlex.split(custom)
+    report = tmp_path / "report"
+    named, custom = (Section(report, one, (), (), ()) for one in contents(tmp_path))
+    assert named.suite_command == f"nox -s bench -- paper --out {tmp_path}"
+    assert custom.suite_command == ""
+    assert shlex.split(named.command)[:6] == [
+        "python",
+        "-m",
+        "benchmarks",
+        "run",
+        "paper",
+        "--methods",
+    ]
+    words = shlex.split(custom.command)
     assert words[:5] == ["python", "-m", "benchmarks", "run", "--methods"]
     specs = split(words[5])
     assert specs == ["lscm", "slim(energy='conformal', iterations=20, tolerance=None)"]
     assert registry.method("slim(energy='conformal', iterations=20)")[0] == "slim"
-    assert words[6:] == ["--cases", "a file.off", "--seeds", "0"]
+    assert words[6:] == ["--cases", "a file.off", "--seeds", "0", "--out", str(tmp_path)]

@@ -2,9 +2,9 @@ import math
 
 import pytest
 
+from benchmarks.metrics.grades import grade_of
 from reports.ranking import (
     TIME_TIE,
-    grade_of,
     is_of_angles,
     marks,
     may_rank,

@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from baselines import registry
+from baselines.disks.bff import closed_curve
 from baselines.disks.slim import DENSITIES, SLIM, map_energy
 from baselines.disks.tutte import Tutte, tutte
 from parapoint.errors import InputError
@@ -344,3 +345,26 @@ def test_slim_refuses_energies_that_do_not_work():
 
 def test_steps_that_a_trace_keeps():
     assert [n for n in range(1, 131) if is_kept(n, 130)] == [1, 2, 5, 10, 20, 50, 100, 130]
+
+
+def test_arap_traces_some_steps_and_the_last():
+    result = mapped("arap(iterations=12)", irregular_disk())
+    assert [point.iteration for point in result.trace] == [1, 2, 5, 10, 12]
+    assert_array_equal(result.trace[-1].uv, result.uv)
+    energies = [point.values["arap"] for point in result.trace]
+    assert energies == sorted(energies, reverse=True)
+    assert result.report["end_energy"] == energies[-1]
+
+
+@pytest.mark.parametrize("start", range(4))
+def test_a_closed_curve_is_turned_onto_its_longest_axis(start):
+    """A parallelogram of sides 2 and 1, at 60 degrees, from each of its corners."""
+    lengths = np.roll([2.0, 1, 2, 1], start)
+    turning = np.roll(np.radians([120, 60, 120, 60]), start)
+    curve = closed_curve(lengths, turning)
+    along = np.roll(curve, -1, axis=0) - curve
+    assert_allclose(np.linalg.norm(along, axis=1), lengths)
+    assert signed_areas(curve, np.array([[0, 1, 2], [0, 2, 3]])).sum() == pytest.approx(np.sqrt(3))
+    u, v = (curve - curve.mean(axis=0)).T
+    assert u @ v == pytest.approx(0, abs=1e-12)
+    assert u @ u > v @ v

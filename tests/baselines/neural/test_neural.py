@@ -114,3 +114,11 @@ def test_normals_are_those_of_the_mesh_or_of_the_cloud():
 def test_a_budget_below_one_is_refused(field):
     with pytest.raises(InputError, match=field):
         FAM(**{field: 0})
+
+
+def test_the_rivals_train_on_all_points_as_they_are():
+    """Their papers have neither noise, nor a warm-up, nor a last phase."""
+    for method in (FAM, Nuvo):
+        assert method.schedule.perturbation == 0
+        assert method.schedule.warm_up == 0
+        assert method.schedule.all_from == 1

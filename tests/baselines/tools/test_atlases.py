@@ -269,3 +269,30 @@ def test_external_program_must_exist_and_have_places():
     for spec in ("external", "external(command='tool {input}')"):
         with pytest.raises(InputError, match=r"needs \{(input|output)\}"):
             registry.method(spec)
+
+
+ROUNDING = """import sys
+rows = [line.split() for line in open(sys.argv[1])]
+points = [[float(x) for x in row[1:]] for row in rows if row[0] == "v"]
+with open(sys.argv[2], "w") as file:
+    for x, y, z in points:
+        print("v", x + {step}, y, z, file=file)
+        print("vt", x, y, file=file)
+    for row in rows:
+        if row[0] == "f":
+            print("f", *(f"{{k}}/{{k}}" for k in row[1:]), file=file)
+"""
+"""A program that maps each vertex to its x and y, and writes its x with an error."""
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e3])
+def test_external_program_may_round_but_not_move_vertices(tmp_path, size):
+    flat = irregular_disk()
+    flat = Mesh(flat.vertices * size / np.ptp(flat.vertices, axis=0).max(), flat.faces)
+    script = tmp_path / "tool.py"
+    spec = f"external(command={f'{sys.executable} {script} {{input}} {{output}}'!r})"
+    script.write_text(ROUNDING.format(step=9e-5 * size))
+    assert_allclose(mapped(spec, flat).uv, flat.vertices[:, :2])
+    script.write_text(ROUNDING.format(step=2e-4 * size))
+    with pytest.raises(FlatteningError, match="changed the faces or their order"):
+        mapped(spec, flat)

@@ -7,7 +7,7 @@ from scipy.spatial import Delaunay, cKDTree
 from parapoint.computed import reconstruction
 from parapoint.computed.delaunay import delaunay_complex, empty_radii
 from parapoint.computed.reconstruction import triangulation
-from parapoint.computed.sheets import _signs, sheet_normals, sheet_triangles
+from parapoint.computed.sheets import _fitted, _signs, sheet_normals, sheet_triangles
 from parapoint.surfaces.surface import Mesh, unit_normals
 
 SIDE = 24
@@ -117,3 +117,11 @@ def test_triangles_do_not_close_a_bay_of_a_sheet() -> None:
     triangles, _ = sheet_triangles(points, np.tile([0.0, 0, 1], (66, 1)))
     assert len(triangles) > 80
     assert not (y[triangles] == 0).all(axis=1).any()
+
+
+def test_a_plane_is_fitted_through_the_neighbours_of_every_row() -> None:
+    """Four neighbours are enough for a plane, the point of the first row among them."""
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
+    tilted = np.tile([0.0, np.sin(0.1), np.cos(0.1)], (5, 1))
+    assert np.abs(_fitted(points, tilted)[:, 2]) == pytest.approx(np.ones(5))
+    assert np.array_equal(_fitted(points[:4], tilted[:4]), tilted[:4])

@@ -12,7 +12,7 @@ from parapoint.planar.bijection import (
     is_bijective,
     signed_areas,
 )
-from parapoint.planar.embedding import tutte
+from parapoint.planar.embedding import embedded_in_disk
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh
 
@@ -52,7 +52,7 @@ def test_a_surface_that_would_cover_itself_does_not() -> None:
     linear = igl.lscm(mesh.vertices, mesh.faces, pins, np.array([[0.0, 0.0], [1.0, 0.0]]))[0]
     assert score(mesh, linear)["overlap_area"] > 0.1
     found = score(mesh, bijective_map(mesh, linear))
-    start = score(mesh, tutte(mesh))
+    start = score(mesh, embedded_in_disk(mesh))
     assert found["bijective"] == 1
     assert found["angle_difference_mean"] < start["angle_difference_mean"] / 3
 
@@ -137,8 +137,8 @@ def test_a_crossing_or_turned_map_is_not_bijective() -> None:
     covering = igl.lscm(mesh.vertices, mesh.faces, pins, np.array([[0.0, 0.0], [1.0, 0.0]]))[0]
     assert (signed_areas(covering, mesh.faces) > 0).all()
     assert not is_bijective(mesh, covering)
-    assert is_bijective(mesh, tutte(mesh))
-    assert not is_bijective(mesh, tutte(mesh)[:, ::-1])
+    assert is_bijective(mesh, embedded_in_disk(mesh))
+    assert not is_bijective(mesh, embedded_in_disk(mesh)[:, ::-1])
 
 
 def test_a_face_without_area_is_refused() -> None:
@@ -156,11 +156,15 @@ def test_the_descents_end_with_the_time_and_leave_what_they_have(monkeypatch) ->
         mesh, None, deadline=4.5
     )  # five steps of the first descent, none of the others
     assert score(mesh, some)["bijective"] == 1
-    start, end = (score(mesh, uv)["angle_difference_mean"] for uv in (tutte(mesh), whole))
+    start, end = (
+        score(mesh, uv)["angle_difference_mean"] for uv in (embedded_in_disk(mesh), whole)
+    )
     assert end < score(mesh, some)["angle_difference_mean"] < start
     none = bijective_map(mesh, None, deadline=0.0)
-    size = np.sqrt(mesh.face_areas.sum() / igl.doublearea(tutte(mesh), mesh.faces).sum() * 2)
-    np.testing.assert_allclose(none, size * tutte(mesh))
+    size = np.sqrt(
+        mesh.face_areas.sum() / igl.doublearea(embedded_in_disk(mesh), mesh.faces).sum() * 2
+    )
+    np.testing.assert_allclose(none, size * embedded_in_disk(mesh))
 
 
 def test_a_map_is_at_the_layout_when_it_is_that_and_not_merely_near(monkeypatch) -> None:
@@ -169,7 +173,7 @@ def test_a_map_is_at_the_layout_when_it_is_that_and_not_merely_near(monkeypatch)
     # near, not there, so the map sets out again and comes to the square.
     x, y = np.meshgrid(np.linspace(0, 1, 9), np.linspace(0, 1, 9))
     mesh = Mesh(np.column_stack([x.ravel(), y.ravel(), np.zeros(81)]), grid(9, 9))
-    start = tutte(mesh) / np.sqrt(np.pi)
+    start = embedded_in_disk(mesh) / np.sqrt(np.pi)
     assert 0.1 < bijection.excess(mesh, start, igl.SYMMETRIC_DIRICHLET) < 10
     descended, calls = bijection.descended, []
 

@@ -1,4 +1,9 @@
-"""The faces that span a learned seam: laid to one bank of it, or cut along a path of edges."""
+"""Faces across the seam of a map with one uv for each vertex: laid to one side of it, or cut.
+
+Such a map cannot show its seam: the corners of some faces lie on both sides of it. The rule that
+finds them here needs the map alone, so that a seam can be cut. The benchmark's *spanning* faces
+(`benchmarks.metrics.seams`) are judged by a stricter rule, which asks for an overlap too.
+"""
 
 from __future__ import annotations
 
@@ -17,33 +22,34 @@ Transform = Callable[[FloatArray], FloatArray]
 """A map of points (N, 3) to the plane (N, 2)."""
 
 LENGTH = 0.01
-"""Shortest spanning edge, in sides of the map's square box: T_cut of the paper."""
+"""Length in the plane above which an edge may lie across the seam, in sides of the map's square
+bounding box: T_cut of the paper."""
 STRETCH = 5.0
-"""How many times more than the edges around either end a spanning edge is stretched."""
+"""An edge across the seam is stretched more than this many times as much as the edges around it."""
 MOST_PIECES = 2_000_000
-"""Pieces that all edges together are divided into at most, besides one of each."""
+"""The edges together are divided into at most this many pieces, besides one for each edge."""
 IN_BAND = 0.1
-"""Cost of a cut among the faces that span the seam, as a fraction of its cost elsewhere."""
+"""Cost of a cut among the faces across the seam, as a fraction of its cost elsewhere."""
 SHORTEST_BRANCH = 4
-"""Edges of the shortest branch of a seam that is followed."""
+"""A branch of the seam is followed only if it has at least this many edges."""
 ROUNDS = 5
-"""How often the vertices of flipped faces are placed anew."""
+"""Rounds, at most, in which the vertices of flipped faces are placed anew."""
 
 
-def spanning_edges(
+def edges_across_seam(
     mesh: Mesh,
     uv: FloatArray,
     transform: Transform | None = None,
     spacing: float = math.inf,
 ) -> BoolArray:
-    """(E,) the edges of `mesh` that a map with one uv (V, 2) for each vertex draws across its seam.
+    """(E,) whether a map with one uv (V, 2) for each vertex draws an edge across its seam.
 
-    They are longer in the plane than T_cut, and at both ends stretched STRETCH times as much as
-    the lower quartile of the edges there, so that one calm bank tells.
+    They are longer in the plane than T_cut, and stretched more than STRETCH times as much as the
+    lower quartile of the edges at one of their ends: the less torn side of the seam decides.
 
-    Of an edge that is long beside the seam's own width the ends tell little: it may reach around a
-    limb and end near where it began. With the map as a function all this holds of the pieces of
-    the edges, and an edge spans the seam where one of its pieces does.
+    The two ends of a long edge tell little: it may reach around a limb and end near where it began.
+    Given the map as a function, the rule looks at pieces of each edge instead, and an edge lies
+    across the seam where one of its pieces does.
 
     Args:
         mesh: the surface.
@@ -68,8 +74,8 @@ def spanning_edges(
     quartile[used] = np.tile(stretch, 2)[order][(first + degree // 4)[used]]
     box = np.ptp(uv[mesh.referenced], axis=0).max()
     calm = np.minimum(quartile[start], quartile[end])[edge]
-    spans = (length > LENGTH * box) & (stretch > STRETCH * calm)
-    return np.asarray(np.bincount(edge, spans, len(count)) > 0)
+    across = (length > LENGTH * box) & (stretch > STRETCH * calm)
+    return np.asarray(np.bincount(edge, across, len(count)) > 0)
 
 
 def _piece_lengths(
@@ -88,27 +94,27 @@ def _piece_lengths(
     return np.asarray(steps[edge[1:] == edge[:-1]])
 
 
-def spanning_faces(mesh: Mesh, uv: FloatArray) -> BoolArray:
-    """(F,) the faces with an edge that spans the seam of a map with one uv (V, 2) a vertex."""
-    spans = spanning_edges(mesh, uv)[mesh.edge_of_halfedge]
-    return np.asarray(spans.reshape(-1, 3).any(axis=1))
+def faces_across_seam(mesh: Mesh, uv: FloatArray) -> BoolArray:
+    """(F,) whether a face has an edge across the seam of a map with one uv (V, 2) a vertex."""
+    across = edges_across_seam(mesh, uv)[mesh.edge_of_halfedge]
+    return np.asarray(across.reshape(-1, 3).any(axis=1))
 
 
 def learned_seam(mesh: Mesh, uv: FloatArray) -> BoolArray:
-    """(E,) a clean cut along the seam that a map with one uv (V, 2) for each vertex tears at.
+    """(E,) a clean cut along the seam at which a map with one uv (V, 2) for each vertex tears.
 
-    The spanning faces form a band along the seam, where edges are cheap to cut. A closed surface
-    or one with handles is opened by the cheapest cut to a disk (a sphere along the longest path in
-    the band); then one branch after another is led from the cut or the boundary to what is left
-    farthest of the band. Branches only start where it is open already, so that the surface stays in
-    one piece and, once it is a disk, a disk.
+    The faces across the seam form a band, where edges are cheap to cut. A closed surface or one
+    with handles is opened by the cheapest cut to a disk (a sphere along the longest path in the
+    band). Then one branch after another is led from the cut or the boundary to the farthest vertex
+    of the band that is left. Branches start only where the surface is open already, so that it
+    stays in one piece and, once it is a disk, a disk.
 
     Args:
         mesh: connected, manifold, consistently oriented.
         uv: (V, 2) the map.
     """
     band = np.zeros(len(mesh.edges), dtype=bool)
-    band[mesh.edge_of_halfedge.reshape(-1, 3)[spanning_faces(mesh, uv)]] = True
+    band[mesh.edge_of_halfedge.reshape(-1, 3)[faces_across_seam(mesh, uv)]] = True
     lengths = edge_lengths(mesh)
     cost = np.where(band, IN_BAND, 1.0) * lengths
     inner = mesh.edge_face_count == 2
@@ -146,10 +152,11 @@ def _longest_path(mesh: Mesh, cost: FloatArray, band: BoolArray) -> BoolArray:
 
 
 def unfolded(mesh: Mesh, uv: FloatArray, disk: Mesh) -> FloatArray:
-    """(V', 2) the map with every vertex of the cut mesh on its own bank of the seam.
+    """(V', 2) the map with every vertex of the cut mesh on its own side of the seam.
 
-    Vertices of faces that do not span keep their uv. All others, which lie at the far bank or on
-    neither, and those of faces that are flipped, are placed where the map is most nearly conformal.
+    Vertices of faces that are not across the seam keep their uv. All others, which lie on the
+    wrong side or on neither, and those of flipped faces are placed where the map is most nearly
+    conformal.
 
     Args:
         mesh: the surface.
@@ -161,7 +168,7 @@ def unfolded(mesh: Mesh, uv: FloatArray, disk: Mesh) -> FloatArray:
     """
     origin = np.empty(len(disk.vertices), dtype=np.int64)
     origin[disk.faces] = mesh.faces
-    sound = ~spanning_faces(mesh, uv)
+    sound = ~faces_across_seam(mesh, uv)
     images = uv[origin]
     if _doubled_areas(images[disk.faces[sound]]).sum() < 0:
         images = images * [1.0, -1.0]
@@ -180,29 +187,29 @@ def unfolded(mesh: Mesh, uv: FloatArray, disk: Mesh) -> FloatArray:
     return np.asarray(placed)
 
 
-def opened(mesh: Mesh, uv: FloatArray, spans: BoolArray) -> Parameterization:
-    """The map of a mesh by one uv (V, 2) for each vertex, cut where edges span the learned seam.
+def opened(mesh: Mesh, uv: FloatArray, across: BoolArray) -> Parameterization:
+    """The map of a mesh by one uv (V, 2) for each vertex, cut where edges lie across its seam.
 
-    A face with one edge that does not span stays at that edge's bank: its third corner gets a uv
-    of its own, where the face has its true shape. A face of three spanning edges becomes a chart
-    of its own, in its true shape, beside its first corner.
+    A face with an edge that is not across the seam stays on the side of that edge: its third corner
+    gets a uv of its own, where the face has its true shape. A face with three edges across the seam
+    becomes a chart of its own, in its true shape, beside its first corner.
 
     Args:
         mesh: the surface.
         uv: the images of its vertices.
-        spans: (E,) whether an edge spans the seam (see `spanning_edges`).
+        across: (E,) whether an edge lies across the seam (see `edges_across_seam`).
     """
-    spans = spans[mesh.edge_of_halfedge].reshape(-1, 3)
+    torn = across[mesh.edge_of_halfedge].reshape(-1, 3)
     rows = [uv]
     corners: IntArray = mesh.faces.copy()
     count = len(uv)
-    sound = ~spans.any(axis=1)
+    sound = ~torn.any(axis=1)
     doubled = _doubled_areas(uv[mesh.faces[sound]])
     mirror = 1.0 if doubled.sum() >= 0 else -1.0
     real = mesh.face_areas[sound].sum()
     scale = float(np.sqrt(np.abs(doubled).sum() / 2 / real)) if real > 0 else 1.0
     for face in np.flatnonzero(~sound):
-        kept = int(np.argmin(spans[face]))
+        kept = int(np.argmin(torn[face]))
         at = [kept, (kept + 1) % 3, (kept + 2) % 3]
         a, b, c = mesh.vertices[mesh.faces[face, at]]
         base, side = b - a, c - a
@@ -210,15 +217,15 @@ def opened(mesh: Mesh, uv: FloatArray, spans: BoolArray) -> Parameterization:
         if squared == 0:
             continue
         along = float(side @ base) / squared
-        across = mirror * float(np.linalg.norm(np.cross(base, side))) / squared
+        upward = mirror * float(np.linalg.norm(np.cross(base, side))) / squared
         start = uv[mesh.faces[face, at[0]]]
         edge = uv[mesh.faces[face, at[1]]] - start
-        if spans[face].all():
+        if torn[face].all():
             edge = np.array([scale * np.sqrt(squared), 0.0])
             rows += [start[None], (start + edge)[None]]
             corners[face, at[:2]] = count, count + 1
             count += 2
-        rows.append((start + along * edge + across * np.array([-edge[1], edge[0]]))[None])
+        rows.append((start + along * edge + upward * np.array([-edge[1], edge[0]]))[None])
         corners[face, at[2]] = count
         count += 1
     return Parameterization(np.concatenate(rows), corners)

@@ -1,9 +1,9 @@
-"""Which edges span a seam, and what becomes of their faces, on grids whose answers are known."""
+"""Which edges lie across a seam, and what becomes of their faces: grids with known answers."""
 
 import numpy as np
 import pytest
 
-from parapoint.surfaces.spanning import learned_seam, opened, spanning_edges
+from parapoint.surfaces.across_seams import edges_across_seam, learned_seam, opened
 from parapoint.surfaces.surface import Mesh
 
 
@@ -17,24 +17,24 @@ def grid(columns: int, rows: int) -> Mesh:
 
 
 @pytest.mark.parametrize(
-    ("columns", "shift", "is_spanned"),
+    ("columns", "shift", "is_across"),
     [
         (101, 4.5, True),  # 5.5 times as long as it was, and 5 % of the box
         (101, 3.5, False),  # 4.5 times: that may be the map
         (1001, 4.5, False),  # 0.5 % of the box: too short to see
     ],
 )
-def test_a_spanning_edge_is_five_times_its_length_and_a_hundredth_of_the_box(
-    columns: int, shift: float, is_spanned: bool
+def test_an_edge_across_is_five_times_its_length_and_a_hundredth_of_the_box(
+    columns: int, shift: float, is_across: bool
 ) -> None:
     # What is right of the middle is moved to the right. A diagonal across becomes √(1 + 5.5²) / √2,
-    # less than 4 times as long, so three straight edges may span.
+    # less than 4 times as long, so three straight edges may lie across.
     mesh = grid(columns, 3)
     uv = mesh.vertices[:, :2] + [shift, 0] * (mesh.vertices[:, :1] > 50)
     ends = mesh.vertices[mesh.edges]
     across = (ends[:, :, 0].sum(axis=1) == 101) & (ends[:, 0, 1] == ends[:, 1, 1])
     assert across.sum() == 3
-    assert np.array_equal(spanning_edges(mesh, uv), across & is_spanned)
+    assert np.array_equal(edges_across_seam(mesh, uv), across & is_across)
 
 
 def test_one_calm_end_is_enough() -> None:
@@ -42,26 +42,26 @@ def test_one_calm_end_is_enough() -> None:
     mesh = grid(9, 9)
     uv = mesh.vertices[:, :2].copy()
     uv[40] += [30, 10]
-    assert np.array_equal(spanning_edges(mesh, uv), (mesh.edges == 40).any(axis=1))
+    assert np.array_equal(edges_across_seam(mesh, uv), (mesh.edges == 40).any(axis=1))
 
 
 def test_a_third_of_the_edges_makes_an_end_calm() -> None:
     # Two columns beside each other are moved apart. Of the six edges of an inner vertex of theirs
-    # only the two along the column are calm, yet the four others all span.
+    # only the two along the column are calm, yet the four others all lie across.
     mesh = grid(9, 9)
     x, y = mesh.vertices[:, 0], mesh.vertices[:, 1]
     uv = mesh.vertices[:, :2] + np.where(x == 4, 30, np.where(x == 5, -60, 0))[:, None]
     inner = ((y[mesh.edges] > 0) & (y[mesh.edges] < 8)).all(axis=1)
     left, right = np.sort(x[mesh.edges], axis=1).T
     spans = (left < right) & (left >= 3) & (right <= 6)
-    assert np.array_equal(spanning_edges(mesh, uv)[inner], spans[inner])
+    assert np.array_equal(edges_across_seam(mesh, uv)[inner], spans[inner])
 
 
 @pytest.mark.parametrize("mirror", [1, -1])
-def test_faces_that_span_are_turned_as_the_others(mirror: int) -> None:
+def test_faces_across_are_turned_as_the_others(mirror: int) -> None:
     mesh = grid(21, 3)
     uv = (mesh.vertices[:, :2] + [30, 50] * (mesh.vertices[:, :1] > 10)) * [mirror, 1]
-    result = opened(mesh, uv, spanning_edges(mesh, uv))
+    result = opened(mesh, uv, edges_across_seam(mesh, uv))
     a, b, c = (result.uv[result.corners[:, k]] for k in range(3))
     first, second = b - a, c - a
     area = (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / 2

@@ -1,0 +1,129 @@
+"""How long cells take, about: what `list suites` says, and what a run expects of its rest.
+
+The rates were measured; nothing but words on a screen depends on them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import NamedTuple
+
+from benchmarks.cases import models
+from benchmarks.cases.suites import Suite
+from parapoint.errors import InputError
+
+SECONDS_PER_10000_FACES: dict[str, float] = {
+    "tutte": 0.03,
+    "harmonic": 0.03,
+    "lscm": 0.05,
+    "bff": 0.2,
+    "arap": 1.0,
+    "slim": 1.5,
+    "xatlas": 5.0,
+    "computed": 25.0,
+    "unwrap": 40.0,
+    "meshed": 6.0,
+}
+"""Processor time in seconds for 10,000 faces on a core of 2 GHz, by method: medians over the models
+of `disk`. It grows faster than the faces for some; a budget bounds it."""
+OTHERS = 3.0
+"""The same of a method that is not listed."""
+WHOLE_BUDGET = frozenset({"parapoint", "fam", "nuvo"})
+"""Methods that use all of their time budget, which is in seconds."""
+SECONDS_PER_ITERATION = 0.075
+"""Processor time of an iteration of ParaPoint's training at 2,048 points, in seconds."""
+OVERHEAD = 0.7
+"""Wall time in seconds that the metrics and the process of a cell take beside its method."""
+USUAL_FACES = 10_000
+"""Number of faces that a surface counts for whose size is not known before it is read."""
+
+
+def faces(case: str) -> int:
+    """Number of faces of a case, or of points; USUAL_FACES where only its file can tell."""
+    try:
+        model = models.info(case)
+    except InputError:
+        return USUAL_FACES
+    return (model.faces or model.vertices) if model else USUAL_FACES
+
+
+def cell_seconds(case: str, method: str, params: Mapping[str, object]) -> float:
+    """Wall time in seconds that a cell takes with a core for itself, about."""
+    budget = params.get("time_budget")
+    if method in WHOLE_BUDGET:
+        count = params.get("iterations")
+        seconds = SECONDS_PER_ITERATION * count if isinstance(count, int) else 300.0
+    else:
+        seconds = SECONDS_PER_10000_FACES.get(method, OTHERS) * faces(case) / 10_000
+    if isinstance(budget, int | float):
+        seconds = float(budget) if method in WHOLE_BUDGET else min(seconds, float(budget))
+    return seconds + OVERHEAD
+
+
+class Expectation(NamedTuple):
+    """What a suite needs, about.
+
+    Attributes:
+        cells: how many cells it has.
+        seconds: wall time on one core.
+        megabytes: what its models are to download, in units of 10^6 bytes.
+    """
+
+    cells: int
+    seconds: float
+    megabytes: float
+
+
+def expectation(
+    suite: Suite, parameters: Callable[[str], tuple[str, Mapping[str, object]]]
+) -> Expectation:
+    """What a suite needs.
+
+    Args:
+        suite: the suite.
+        parameters: of a spec, the method's name in the registry and all its parameters.
+    """
+    chosen = [parameters(spec) for spec in suite.methods]
+    seconds = sum(cell_seconds(case, *method) for case in suite.cases for method in chosen)
+    known = {found.name: found.size for found in map(_model, suite.cases) if found}
+    return Expectation(
+        len(suite.cases) * len(chosen) * len(suite.seeds),
+        seconds * len(suite.seeds),
+        sum(known.values()) / 1e6,
+    )
+
+
+def _model(case: str) -> models.Model | None:
+    """The model that a case is, or is sampled from; None where nothing is downloaded."""
+    return models.registry().get(case.partition("@")[0])
+
+
+def remaining(done: Iterable[float], left: Iterable[float], elapsed: float, jobs: int) -> float:
+    """Wall time in seconds that the rest of a run takes, about.
+
+    Before the first cell ends, expectations tell. Later they are scaled by how long the cells that
+    are done have taken against what was expected of them.
+
+    Args:
+        done: what was expected of each cell that is done (`cell_seconds`).
+        left: what is expected of each other cell.
+        elapsed: wall time in seconds of the run so far.
+        jobs: how many cells run at a time.
+    """
+    expected = sum(done)
+    pace = elapsed / expected if expected else 1 / jobs
+    return sum(left) * pace
+
+
+def clock(seconds: float) -> str:
+    """A time span as h:mm:ss."""
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes // 60}:{minutes % 60:02}:{rest:02}"
+
+
+def about(seconds: float) -> str:
+    """A time span in words and round numbers: a guess has no more digits."""
+    if seconds < 90:
+        return f"{max(10, round(seconds, -1)):.0f} s"
+    minutes = seconds / 60
+    return f"{minutes:.0f} min" if minutes < 90 else f"{minutes / 60:.1f} h"
