@@ -1,7 +1,8 @@
-"""`python -m benchmarks run | score | list | check`: the benchmark's commands."""
+"""`python -m benchmarks`: run, list, check, score, publish and more; `--help` names all."""
 
 from __future__ import annotations
 
+import importlib
 import logging
 import shlex
 from pathlib import Path
@@ -168,10 +169,16 @@ def _shown_run(suite: Suite, out: Path, **options: Any) -> Summary:
     """Run a suite, and show the user how it goes."""
     from benchmarks.commands.display import Display, print_summary
     from benchmarks.running import runner
+    from benchmarks.store import versions
+    from benchmarks.store.results import Store
 
     with Display() as progress:
         summary = runner.run(suite, out, progress=progress, **options)
     print_summary(summary)
+    store = Store(out)
+    for name, counts in versions.versions(store, store.rows()).items():
+        if len(counts) > 1:
+            print(f"{out} holds {name} in several versions: {versions.said(counts)}")
     return summary
 
 
@@ -207,15 +214,23 @@ def check(ctx: click.Context, folder: Path) -> None:
         ctx.exit(1)
 
 
-@main.command(context_settings=ELSEWHERE, add_help_option=False)
-@click.argument("arguments", nargs=-1, type=click.UNPROCESSED)
-@click.pass_context
-def score(ctx: click.Context, arguments: tuple[str, ...]) -> None:
-    """Every metric of an existing UV map."""
-    from benchmarks.commands.score import score as command
+def _elsewhere(module: str, name: str, about: str) -> None:
+    """Add a command whose options its own module reads."""
 
-    with command.make_context(f"{ctx.command_path}", list(arguments), parent=ctx.parent) as inner:
-        command.invoke(inner)
+    @main.command(name, help=about, context_settings=ELSEWHERE, add_help_option=False)
+    @click.argument("arguments", nargs=-1, type=click.UNPROCESSED)
+    @click.pass_context
+    def called(ctx: click.Context, arguments: tuple[str, ...]) -> None:
+        command = getattr(importlib.import_module(f"benchmarks.commands.{module}"), name)
+        with command.make_context(name, list(arguments), parent=ctx.parent) as inner:
+            command.invoke(inner)
+
+
+_elsewhere("score", "score", "Every metric of an existing UV map.")
+_elsewhere("travelling", "publish", "Write a results folder into one sealed archive.")
+_elsewhere("travelling", "merge", "Join results folders and archives.")
+_elsewhere("travelling", "verify", "Compute every metric of an archive anew.")
+_elsewhere("travelling", "submit", "Score maps that any tool has made.")
 
 
 @main.command()
