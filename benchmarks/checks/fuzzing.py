@@ -3,8 +3,8 @@
 A target takes bytes as the content of a file. It may return, or raise InputError. Any other
 exception is a finding, and so is an input of up to a million bytes that takes more than a second of
 processor time or 200 megabytes (`score` measures what it reads, and may take more). atheris
-(libFuzzer) changes valid files, guided by the branches of the Python code that they reach, and keeps
-each input that made a finding. The tests do the same for a short time, without guidance.
+(libFuzzer) changes valid files, guided by the branches of the Python code that they reach, and
+keeps each input that made a finding. The tests do the same for a short time, without guidance.
 """
 
 from __future__ import annotations
