@@ -83,15 +83,15 @@ class Crowd:
     def _chances(self, level: int, i: IntArray, j: IntArray, weight: FloatArray) -> FloatArray:
         """(N,) the chance of each pair to be kept, some `SAMPLE` in sum at most."""
         boxes = self.tree.levels[level]
-        lower, upper = (
-            np.maximum(boxes[i, :2], boxes[j, :2]),
-            np.minimum(-boxes[i, 2:], -boxes[j, 2:]),
-        )
+        lower = np.maximum(boxes[i, :2], boxes[j, :2])
+        upper = np.minimum(-boxes[i, 2:], -boxes[j, 2:])
         across, sine = 2 * self._oriented[level][5], self._angle(level, i, j)[1]
-        crossing = across[i] * across[j] / np.maximum(sine, np.finfo(np.float64).tiny)
-        area = weight * np.minimum(np.prod(upper - lower, axis=1), crossing)
+        with np.errstate(over="ignore", invalid="ignore"):  # 0 / 0 where parallels have no width
+            crossing = across[i] * across[j] / np.maximum(sine, np.finfo(np.float64).tiny)
+            area = weight * np.fmin(np.prod(upper - lower, axis=1), crossing)
+            total = float(area.sum())
         share = weight / weight.sum()
-        if 0 < (total := float(area.sum())) < np.inf:
+        if 0 < total < np.inf:
             share = (share + area / total) / 2
         return np.asarray(np.minimum(SAMPLE * share, 1.0))
 
