@@ -30,6 +30,7 @@ from reports.tables.notes import (
     load_notes,
     method_notes,
 )
+from reports.tables.overall import overall
 from reports.tables.published import AUTHORS, Verdict, claim_text, published_values, verdicts
 from reports.tables.statistics import paired_tests, seed_variance
 from reports.tables.table import (
@@ -419,6 +420,7 @@ def tables(contents: Contents) -> list[Table]:
     made = [
         ablation(contents),
         success(contents),
+        overall(contents),
         means_by_kind(contents),
         conformality(contents),
         against_published(contents),
