@@ -1,8 +1,8 @@
 """Runs the cells of a suite that a results folder lacks, each in a process of its own.
 
-The process of the run plans (`benchmarks.running.planning`), workers the cells to an executor
-(`benchmarks.running.executors`), and alone writes rows. It may be killed at any time: a cell that
-has its row is done, and the same call goes on with the others.
+The process of the run plans the cells (`benchmarks.running.planning`), hands them to an executor
+(`benchmarks.running.executors`), and is the only one to write rows. It may be killed at any time: a
+cell that has its row is done, and the same call goes on with the others.
 """
 
 from __future__ import annotations
