@@ -1,14 +1,16 @@
 """A map of a bare cloud with short seams, computed without training.
 
-The cloud is triangulated, cut open (`parapoint.computed.seams`), and laid out by the scale of a
-conformal map (`parapoint.computed.layout`). The map is then made bijective
-(`parapoint.planar.bijection`) and, unless it is to be conformal at any cost, such that every part
-keeps its area (`parapoint.computed.parts`).
+The cloud is thinned where it is scanned in lines (`parapoint.surfaces.scan_lines`), triangulated,
+cut open (`parapoint.computed.seams`), and laid out by the scale of a conformal map
+(`parapoint.computed.layout`). The map is then made bijective (`parapoint.planar.bijection`) and,
+unless it is to be conformal at any cost, such that every part keeps its area
+(`parapoint.computed.parts`).
 """
 
 from __future__ import annotations
 
 import math
+import time
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +25,7 @@ from parapoint.planar.bijection import bijective_map
 from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.cutting import origin
 from parapoint.surfaces.parameterization import Charted, Parameterization
+from parapoint.surfaces.scan_lines import Lines, thinned
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 
 FEWER_DEFECTS = 0.5
@@ -33,6 +36,8 @@ LONELY = 6.0
 """Cost of a vertex most of whose edges cross the seam, in such edges' share."""
 SWEEPS = 10
 """Passes over the seam in the choice of sides."""
+SEAM_SHARE = 0.5
+"""Share of the time for a map after which its seams are led no farther."""
 LEAST_PART = 0.5
 """Share of the points that the triangulation must reach."""
 
@@ -42,6 +47,7 @@ class FlatMap(NamedTuple):
 
     Attributes:
         anchors: (A,) rows of the cloud.
+        missed: (B,) rows that the triangulation did not reach.
         uv: (A, 2) images; the map keeps the total area.
         jacobians: (A, 2, 3) d uv / d x.
         inverse_jacobians: (A, 3, 2) d x / d uv.
@@ -51,6 +57,7 @@ class FlatMap(NamedTuple):
     """
 
     anchors: IntArray
+    missed: IntArray
     uv: FloatArray
     jacobians: FloatArray
     inverse_jacobians: FloatArray
@@ -73,6 +80,7 @@ class Flattened(NamedTuple):
 
     Attributes:
         rows: (A,) rows of the cloud that the triangulation reached.
+        missed: (B,) rows that it did not reach; those in neither were thinned out.
         mesh: the triangulation of these A points.
         disk: the mesh cut to a planar domain of M vertices.
         origin: (M,) the vertex of `mesh` that each one of `disk` is or copies.
@@ -81,6 +89,7 @@ class Flattened(NamedTuple):
     """
 
     rows: IntArray
+    missed: IntArray
     mesh: Mesh
     disk: Mesh
     origin: IntArray
@@ -103,25 +112,30 @@ def flattened(
 
     Raises:
         ReconstructionError: the points show no surface that can be followed and flattened.
+        InputError: the points lie on lines too far apart.
     """
-    mesh, is_denoised = _still(points)
+    lines = thinned(points)
+    rows = np.arange(len(points)) if lines is None else lines.rows
+    mesh, is_denoised = _still(points[rows], lines)
     reached = np.flatnonzero(mesh.referenced)
-    if len(reached) < LEAST_PART * len(points):
+    if len(reached) < LEAST_PART * len(rows):
         raise ReconstructionError(
-            f"the largest component holds {len(reached)} of {len(points)} points"
+            f"the largest component holds {len(reached)} of {len(rows)} points"
         )
-    row = np.full(len(points), -1, dtype=np.int64)
+    row = np.full(len(rows), -1, dtype=np.int64)
     row[reached] = np.arange(len(reached))
+    missed = rows[~mesh.referenced]
     mesh = Mesh(mesh.vertices[reached], row[mesh.faces])
+    begun = time.monotonic()
     try:
-        disk = seamed(mesh, distortion)
+        disk = seamed(mesh, distortion, begun + SEAM_SHARE * (deadline - begun))
         uv = bijective_map(disk, _layout(disk), deadline)
         disk, uv = parts_kept(disk, uv, distortion, deadline)
     except (RuntimeError, np.linalg.LinAlgError) as error:  # a singular factor, no bijection
         raise ReconstructionError(f"the triangulation has no flat map ({error})") from None
     uv -= (uv.max(axis=0) + uv.min(axis=0)) / 2
     uv *= np.sqrt(disk.face_areas.sum() / signed_areas(uv, disk.faces).sum())
-    return Flattened(reached, mesh, disk, origin(mesh, disk), uv, is_denoised)
+    return Flattened(rows[reached], missed, mesh, disk, origin(mesh, disk), uv, is_denoised)
 
 
 def flat_map(
@@ -147,23 +161,24 @@ def flat_map(
         "faces": len(flat.mesh.faces),
         "seam_edges": (boundary[1] - boundary[0]) // 2,
         "denoised": flat.is_denoised,
+        "thinned": len(points) - len(flat.rows) - len(flat.missed),
         "distortion": distortion,
     }
     inverse: FloatArray = np.asarray(np.linalg.pinv(jacobians, rcond=0.1), dtype=np.float64)
     charted = Charted(flat.mesh, Parameterization(flat.uv, flat.disk.faces))
-    return FlatMap(flat.rows, flat.uv[chosen], jacobians, inverse, facts, charted)
+    return FlatMap(flat.rows, flat.missed, flat.uv[chosen], jacobians, inverse, facts, charted)
 
 
-def _still(points: FloatArray) -> tuple[Mesh, bool]:
-    """A triangulation of points (N, 3), and whether it is of the denoised ones.
+def _still(points: FloatArray, lines: Lines | None) -> tuple[Mesh, bool]:
+    """A triangulation of points (N, 3), perhaps on lines, and whether it is of denoised ones.
 
     Details as fine as the spacing look like noise. So that they stay, the denoised points are taken
     only where most defects of the triangulation go with the noise.
     """
-    mesh, moved = triangulation(points), denoised(points)
+    mesh, moved = triangulation(points, lines), denoised(points)
     if moved is points:
         return mesh, False
-    smooth = triangulation(moved)
+    smooth = triangulation(moved, lines)
     if defects(smooth) > FEWER_DEFECTS * defects(mesh):
         return mesh, False
     return smooth, True
