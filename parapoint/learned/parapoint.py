@@ -39,7 +39,7 @@ KEPT_MAPS = 8
 """Maps that go into the trace of `parameterize`, evenly over the run."""
 
 
-@dataclass
+@dataclass(repr=False)
 class ParaPoint(Estimator):
     """Global, free-boundary UV maps of point clouds, learned for each (Zhang, Hou and He, 2024).
 
