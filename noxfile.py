@@ -15,7 +15,7 @@ EXTRAS = ("uvatlas", "uvunwrap")
 
 def install(session: nox.Session, *extras: str) -> None:
     """Install the project with what a run needs, and more extras of pyproject.toml."""
-    wanted = ",".join(["bench", "learned", *extras])
+    wanted = ",".join(["bench", "learned", "meshlab", *extras])
     session.install("-c", "constraints.txt", "-e", f".[{wanted}]")
 
 

@@ -95,6 +95,8 @@ def run(command: click.Command, arguments: list[str] | None = None) -> Never:
         fail(error.format_message())
     except (InputError, OSError) as error:
         fail(str(error))
+    except ModuleNotFoundError as error:
+        fail(f"{error.name} is not installed; in a checkout, pip install -e '.[bench]' brings it")
     except (KeyboardInterrupt, click.Abort):
         print("interrupted", file=sys.stderr)
         sys.exit(130)

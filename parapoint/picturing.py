@@ -47,10 +47,10 @@ def figure(model: Estimator) -> Figure:
     colours = np.where(seam[:, None], 0.0, _hues(uv))
     made = Figure(figsize=(9, 4.5), layout="constrained")
     space = made.add_subplot(1, 2, 1, projection="3d")
-    space.scatter(*points.T, c=colours, s=2)
+    space.scatter(points[:, 0], points[:, 1], points[:, 2], c=colours, s=2)
     space.set_box_aspect(np.ptp(points, axis=0))
     plane = made.add_subplot(1, 2, 2)
-    plane.scatter(*uv.T, c=colours, s=2)
+    plane.scatter(uv[:, 0], uv[:, 1], c=colours, s=2)
     plane.set_aspect("equal")
     for axes, title in ((space, "surface"), (plane, "map")):
         axes.set_title(title)
@@ -61,9 +61,9 @@ def figure(model: Estimator) -> Figure:
 def _hues(uv: FloatArray) -> FloatArray:
     """(N, 3) colours from 0 to 1 that vary smoothly over the places (N, 2) of a plane."""
     at = (uv - np.nanmin(uv, axis=0)) / np.nanmax(np.ptp(uv, axis=0))
-    return np.clip(
-        np.stack([at[:, 0], 0.5 - 0.3 * at[:, 1], 1 - at[:, 0] * at[:, 1]], axis=1), 0, 1
-    )
+    right, up = at.T
+    hues = np.stack([right, 0.5 - 0.3 * up, 1 - right * up], axis=1)
+    return np.asarray(np.clip(hues, 0, 1))
 
 
 def html(model: Estimator) -> str:
