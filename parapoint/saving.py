@@ -14,6 +14,7 @@ import safetensors
 import safetensors.numpy
 
 from parapoint.errors import InputError
+from parapoint.files.targets import complete_file
 
 FORMAT = 5
 """Version of saved models and checkpoints."""
@@ -30,9 +31,8 @@ def write(folder: Path, stem: str, arrays: dict[str, np.ndarray], facts: dict[st
     name = f"{stem}-{_digest(data)}.safetensors"
     text = json.dumps({"format": FORMAT, "tensors": name, **facts}, indent=1)
     for path, content in ((folder / name, data), (folder / f"{stem}.json", text.encode())):
-        temporary = path.with_name(path.name + ".part")
-        temporary.write_bytes(content)
-        temporary.replace(path)
+        with complete_file(path) as file:
+            file.write(content)
     if old is not None and old.name != name:
         old.unlink(missing_ok=True)
 
