@@ -47,13 +47,14 @@ class _Told:
             print(f"measured {done}/{total} ({clock(now - self.began)})", file=sys.stderr)
 
 
-@click.command()
+@click.command(no_args_is_help=True)
 @click.argument("folder", metavar="DIR", type=PATH)
 @click.option("--out", type=PATH, metavar="ARCHIVE.zip", help="[default: DIR.zip]")
 def publish(folder: Path, out: Path | None) -> None:
-    """Write the results in DIR into one sealed archive: rows, maps, metrics, environment, hashes.
+    """Write a results folder into one sealed archive.
 
-    A second time gives the same bytes. Rows of your own files are left out.
+    It holds rows, maps, metrics, environment and hashes. A second time gives the same bytes. Rows
+    of your own files are left out.
     """
     archive = folder.resolve().with_name(f"{folder.resolve().name}.zip") if out is None else out
     found = publishing.publish(folder, archive)
@@ -64,11 +65,11 @@ def publish(folder: Path, out: Path | None) -> None:
     _say(f"check it: {shlex.join(['python', '-m', 'benchmarks', 'verify', str(archive)])}")
 
 
-@click.command()
+@click.command(no_args_is_help=True, options_metavar="[OPTIONS] --out C")
 @click.argument("sources", metavar="A B ...", nargs=-1, required=True, type=PATH)
 @click.option("--out", metavar="C", required=True, type=PATH, help="A new folder.")
 def merge(sources: tuple[Path, ...], out: Path) -> None:
-    """Join results folders and archives into the new folder C.
+    """Join results folders and archives into a new folder.
 
     Where two answer the same cell in another way, the one that is named first stays.
     """
@@ -82,11 +83,11 @@ def merge(sources: tuple[Path, ...], out: Path) -> None:
     _say(f"report: {shlex.join(['python', '-m', 'reports', str(out)])}")
 
 
-@click.command()
-@click.argument("archive", type=PATH)
+@click.command(no_args_is_help=True)
+@click.argument("archive", metavar="ARCHIVE", type=PATH)
 @click.pass_context
 def verify(ctx: click.Context, archive: Path) -> None:
-    """Compute every metric of a published archive anew, from its maps, and say what differs.
+    """Compute every metric of an archive anew, from its maps, and say what differs.
 
     Models are loaded by name and compared by hash. Exit status 1 if anything differs.
     """
@@ -108,15 +109,16 @@ def verify(ctx: click.Context, archive: Path) -> None:
         ctx.exit(1)
 
 
-@click.command()
+@click.command(no_args_is_help=True, options_metavar="[OPTIONS] --method NAME --out DIR")
 @click.argument("folder", metavar="MAPS", type=PATH)
 @click.option("--method", required=True, metavar="NAME", help="What the method is called: a text.")
 @click.option("--suite", default="paper", show_default=True, help="The suite of its cases.")
 @click.option("--out", required=True, metavar="DIR", type=PATH, help="The results folder.")
 def submit(folder: Path, method: str, suite: str, out: Path) -> None:
-    """Score maps that any tool has made: OBJ files with UVs in MAPS, named by case.
+    """Score maps that any tool has made.
 
-    The faces are those of the model, in its order. If one file is not so, all are refused.
+    MAPS holds OBJ files with UVs, named by case. The faces are those of the model, in its order. If
+    one file is not so, all are refused.
     """
     chosen = suites.suite(suite)
     submission = submissions.read(folder, method, chosen)
