@@ -137,7 +137,7 @@ def far_from(known: FloatArray, points: FloatArray) -> BoolArray:
     """(N,) whether points (N, 3) are stray beside the points (n, 3) of a surface.
 
     They are if they lie outside the ball around the surface, and farther from all of its points
-    than APART times the spacing of these.
+    than APART times the spacing of these, or than the radius of the ball.
     """
     frame = Frame.of(known)
     with np.errstate(over="ignore"):
@@ -146,7 +146,7 @@ def far_from(known: FloatArray, points: FloatArray) -> BoolArray:
             tree = cKDTree(known)
             looked_at = known[:: len(known) // SAMPLED + 1]
             nearest = tree.query(looked_at, min(NEAREST + 1, len(known)))[0][:, -1]
-            reach = APART * float(np.median(nearest))
+            reach = min(APART * float(np.median(nearest)), frame.scale)
             is_far[is_far] = ~np.isfinite(tree.query(points[is_far], distance_upper_bound=reach)[0])
     return is_far
 
