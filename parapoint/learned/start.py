@@ -66,7 +66,7 @@ def computed_start(points: FloatArray, gates: int, deadline: float = math.inf) -
     Raises:
         ReconstructionError: the points show no surface that can be followed and flattened.
     """
-    flat = flattened(points, deadline)
+    flat = flattened(points, deadline, "balanced")
     chosen = flat.chosen()
     gradients = flat.jacobians()[chosen].transpose(1, 0, 2)
     at = points[flat.rows]
