@@ -67,8 +67,8 @@ def grown(
 
     A branch stays where it pays, or where more seam is needed and it brings anything. Branches are
     sought on a free map, where one that fails costs a few steps; a map along them that is one to
-    one is then begun anew, and stays if they pay together. Where more seam is needed still, branches
-    of the map that is one to one open one by one, in many more steps.
+    one is then begun anew, and stays if they pay together. Where more seam is needed still,
+    branches of the map that is one to one open one by one, in many more steps.
 
     Args:
         run: the map, settled; it is left as it is.
