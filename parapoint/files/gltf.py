@@ -8,12 +8,14 @@ from __future__ import annotations
 import base64
 import json
 import struct
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from parapoint.errors import InputError
@@ -25,7 +27,7 @@ from parapoint.files.content import (
     welded,
     whole,
 )
-from parapoint.files.decoding import check_decoded
+from parapoint.files.decoding import check_decoded, plain
 from parapoint.surfaces.surface import FloatArray, IntArray
 
 GLTF_TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -37,6 +39,31 @@ APPEARANCE = ("KHR_materials_", "KHR_lights_", "KHR_texture_basisu", "EXT_textur
 
 
 def glb(data: bytes, folder: Path) -> Content:
+    """The content of binary glTF 2; see `gltf`."""
+    return _of_glb(data, folder).content()
+
+
+def gltf(data: bytes, folder: Path) -> Content:
+    """The triangles (or, without any, the points) of a glTF 2 scene, moved to their places.
+
+    glTF splits a vertex wherever a normal or a UV differs, so vertices are welded where their
+    positions are exactly equal: seams of the UV are seams, not boundaries of the mesh. The UV are
+    those of the first set, with v upwards as in OBJ.
+    """
+    return _of_text(data, folder).content()
+
+
+def opened(path: Path) -> Gltf:
+    """The scene in a .glb or .gltf file.
+
+    Raises:
+        InputError, ValueError, KeyError, IndexError, struct.error, TypeError: it is no such file.
+    """
+    of = _of_glb if path.suffix.lower() == ".glb" else _of_text
+    return of(plain(path.read_bytes()), path.parent)
+
+
+def _of_glb(data: bytes, folder: Path) -> Gltf:
     """Binary glTF 2: a header and two chunks, JSON and data."""
     magic, version, _ = struct.unpack_from("<4sII", data)
     if magic != b"glTF" or version != 2:
@@ -49,21 +76,19 @@ def glb(data: bytes, folder: Path) -> Content:
     if len(tail) >= 8:
         size, _ = struct.unpack_from("<I4s", tail)
         chunk = tail[8 : 8 + size]
-    return gltf(data[20 : 20 + length], folder, chunk)
+    return _of_text(data[20 : 20 + length], folder, chunk)
 
 
-def gltf(data: bytes, folder: Path, chunk: bytes = b"") -> Content:
-    """The triangles (or, without any, the points) of a glTF 2 scene, moved to their places.
+def _of_text(data: bytes, folder: Path, chunk: bytes = b"") -> Gltf:
+    return Gltf(json.loads(data), folder, chunk, len(data) + len(chunk))
 
-    glTF splits a vertex wherever a normal or a UV differs, so vertices are welded where their
-    positions are exactly equal: seams of the UV are seams, not boundaries of the mesh. The UV are
-    those of the first set, with v upwards as in OBJ.
+
+class Gltf:
+    """One glTF file while it is read.
+
+    Attributes:
+        tree: its JSON.
     """
-    return _Gltf(json.loads(data), folder, chunk, len(data) + len(chunk)).content()
-
-
-class _Gltf:
-    """One glTF file while it is read."""
 
     def __init__(self, tree: Any, folder: Path, chunk: bytes, size: int) -> None:
         if not isinstance(tree, dict) or not tree.get("meshes"):
@@ -78,7 +103,7 @@ class _Gltf:
         self.tree, self.folder, self.chunk, self.size = tree, folder, chunk, size
         self.buffers: dict[str | int, bytes] = {}
 
-    def _buffer(self, index: int) -> bytes:
+    def buffer(self, index: int) -> bytes:
         """The bytes of a buffer, read once: the file's own chunk, in the text, or a file beside."""
         uri = self.tree["buffers"][index].get("uri")
         key = index if uri is None else uri
@@ -96,13 +121,39 @@ class _Gltf:
             return base64.b64decode(uri.partition(",")[2])
         path = (folder / unquote(uri)).resolve()
         if not path.is_relative_to(folder.resolve()) or not path.is_file():
-            raise InputError(f"its buffer {uri[:80]!r} is not a file beside it")
+            raise InputError(f"its file {uri[:80]!r} is not beside it")
         data = path.read_bytes()
         self.size += len(data)
         return data
 
+    def image(self, index: int) -> bytes:
+        """The bytes of an image file: a piece of a buffer, in the text, or a file beside."""
+        item = self.tree["images"][index]
+        if "bufferView" in item:
+            view = self.tree["bufferViews"][item["bufferView"]]
+            start = view.get("byteOffset", 0)
+            return self.buffer(view["buffer"])[start : start + view["byteLength"]]
+        return self._loaded(1, item["uri"])
+
+    def triangles(self, primitive: dict[str, Any]) -> IntArray:
+        """(F, 3) rows of the vertices of a primitive of mode 4, 5 or 6."""
+        if "indices" in primitive:
+            run = whole(self.accessor(primitive["indices"])).reshape(-1)
+        else:
+            run = np.arange(self.tree["accessors"][primitive["attributes"]["POSITION"]]["count"])
+        return _mode_triangles(primitive.get("mode", 4), run)
+
     def accessor(self, index: int) -> FloatArray | IntArray:
         """(n, width) values; normalized whole numbers become fractions."""
+        array = self.stored(index)
+        if array.dtype.kind == "f":
+            return array.astype(np.float64)
+        if self.tree["accessors"][index].get("normalized"):
+            return np.maximum(array / float(np.iinfo(array.dtype).max), -1.0)
+        return array.astype(np.int64)
+
+    def stored(self, index: int) -> npt.NDArray[Any]:
+        """(n, width) values of an accessor as they are stored."""
         item = self.tree["accessors"][index]
         if "sparse" in item or "bufferView" not in item:
             raise InputError("has sparse or compressed data, which is not read; export it plain")
@@ -111,24 +162,29 @@ class _Gltf:
         width = GLTF_WIDTHS[item["type"]]
         stride = view.get("byteStride", width * kind.itemsize)
         start = view.get("byteOffset", 0) + item.get("byteOffset", 0)
-        raw = self._buffer(view["buffer"])
+        raw = self.buffer(view["buffer"])
         count = item["count"]
         if count < 1 or start < 0 or stride < width * kind.itemsize:
             raise InputError("has an accessor of impossible size")
         if start + (count - 1) * stride + width * kind.itemsize > len(raw):
             raise InputError("ends early, in a buffer")
-        array = np.ndarray((count, width), kind, raw, start, (stride, kind.itemsize))
-        if kind.kind == "f":
-            return array.astype(np.float64)
-        if item.get("normalized"):
-            return np.maximum(array / float(np.iinfo(kind).max), -1.0)
-        return array.astype(np.int64)
+        return np.ndarray((count, width), kind, raw, start, (stride, kind.itemsize))
 
     def placed_primitives(self) -> list[tuple[dict[str, Any], FloatArray]]:
         """Each primitive of the scene with its (4, 4) transform."""
-        nodes = self.tree.get("nodes", [])
-        if not nodes:
+        if not self.tree.get("nodes"):
             return [(p, np.eye(4)) for mesh in self.tree["meshes"] for p in mesh["primitives"]]
+        placed: list[tuple[dict[str, Any], FloatArray]] = []
+        for node, transform in self.placed_nodes():
+            primitives = self.tree["meshes"][node["mesh"]]["primitives"]
+            places = [transform @ local for local in self._instances(node)]
+            check_decoded(128 * (len(placed) + len(places) * len(primitives)), self.size)
+            placed += [(primitive, place) for place in places for primitive in primitives]
+        return placed
+
+    def placed_nodes(self) -> Iterator[tuple[dict[str, Any], FloatArray]]:
+        """Each node of the scene that has a mesh, with its (4, 4) transform."""
+        nodes = self.tree["nodes"]
         scenes = self.tree.get("scenes", [])
         children = {child for node in nodes for child in node.get("children", [])}
         roots = (
@@ -136,7 +192,6 @@ class _Gltf:
             if scenes
             else [index for index in range(len(nodes)) if index not in children]
         )
-        placed: list[tuple[dict[str, Any], FloatArray]] = []
         waiting = [(index, np.eye(4)) for index in reversed(roots)]
         visited: set[int] = set()  # nodes form trees; a file in which they do not must not hang
         while waiting:
@@ -147,12 +202,8 @@ class _Gltf:
             node = nodes[index]
             transform = outer @ _node_transform(node)
             if "mesh" in node:
-                primitives = self.tree["meshes"][node["mesh"]]["primitives"]
-                places = [transform @ local for local in self._instances(node)]
-                check_decoded(128 * (len(placed) + len(places) * len(primitives)), self.size)
-                placed += [(primitive, place) for place in places for primitive in primitives]
+                yield node, transform
             waiting += [(child, transform) for child in reversed(node.get("children", []))]
-        return placed
 
     def _instances(self, node: dict[str, Any]) -> list[FloatArray]:
         """(4, 4) transforms of the copies of a node's mesh (EXT_mesh_gpu_instancing), or one."""
@@ -203,12 +254,7 @@ class _Gltf:
                 points.append(place)
             if mode not in {4, 5, 6}:
                 continue
-            run = (
-                whole(self.accessor(primitive["indices"])).reshape(-1)
-                if "indices" in primitive
-                else np.arange(len(place))
-            )
-            turned = _mode_triangles(mode, run)
+            turned = self.triangles(primitive)
             if np.linalg.det(transform[:3, :3]) < 0:  # a mirror image turns the faces round
                 turned = turned[:, ::-1]
             triangles = turned.reshape(-1)
