@@ -1,4 +1,4 @@
-"""`python -m benchmarks run | score | list | check`: the benchmark's commands."""
+"""`python -m benchmarks`: run, list, check, score, publish and more; `--help` names all."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from parapoint import console
+from parapoint import __version__, console
 from parapoint.errors import InputError
 
 if TYPE_CHECKING:
@@ -18,12 +18,10 @@ if TYPE_CHECKING:
 
 SUITE = "paper"
 """The suite that `run` runs if none is named."""
-ELSEWHERE = {"ignore_unknown_options": True, "help_option_names": []}
-"""Settings of a command whose own module reads the options. That module is slow to import, so only
-running the command imports it."""
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=console.LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="parapoint benchmarks")
 def main() -> None:
     """Compare parameterization methods on real models, and score UV maps."""
     logging.basicConfig(format="%(message)s")
@@ -168,24 +166,30 @@ def _shown_run(suite: Suite, out: Path, **options: Any) -> Summary:
     """Run a suite, and show the user how it goes."""
     from benchmarks.commands.display import Display, print_summary
     from benchmarks.running import runner
+    from benchmarks.store import versions
+    from benchmarks.store.results import Store
 
     with Display() as progress:
         summary = runner.run(suite, out, progress=progress, **options)
     print_summary(summary)
+    store = Store(out)
+    for name, counts in versions.versions(store, store.rows()).items():
+        if len(counts) > 1:
+            print(f"{out} holds {name} in several versions: {versions.said(counts)}")
     return summary
 
 
-@main.command("list")
+@main.command("list", no_args_is_help=True)
 @click.argument("what", type=click.Choice(["suites", "cases", "methods", "metrics"]))
 def list_(what: str) -> None:
-    """Show what there is."""
+    """Show what there is: a table on a terminal, tab-separated values in a pipe."""
     from benchmarks.commands.display import print_table
-    from benchmarks.commands.listing import LISTS
+    from benchmarks.commands.listing import LISTS, entries
 
-    print_table(LISTS[what]())
+    print_table(LISTS[what](), entries)
 
 
-@main.command()
+@main.command(no_args_is_help=True)
 @click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
 @click.pass_context
 def check(ctx: click.Context, folder: Path) -> None:
@@ -207,15 +211,18 @@ def check(ctx: click.Context, folder: Path) -> None:
         ctx.exit(1)
 
 
-@main.command(context_settings=ELSEWHERE, add_help_option=False)
-@click.argument("arguments", nargs=-1, type=click.UNPROCESSED)
-@click.pass_context
-def score(ctx: click.Context, arguments: tuple[str, ...]) -> None:
-    """Every metric of an existing UV map."""
-    from benchmarks.commands.score import score as command
-
-    with command.make_context(f"{ctx.command_path}", list(arguments), parent=ctx.parent) as inner:
-        command.invoke(inner)
+for name, place, summary in (
+    ("score", "score:score", "Grade and metrics of any UV map."),
+    ("publish", "travelling:publish", "Write a results folder into one sealed archive."),
+    ("merge", "travelling:merge", "Join results folders and archives into a new folder."),
+    (
+        "verify",
+        "travelling:verify",
+        "Compute every metric of an archive anew, from its maps, and say what differs.",
+    ),
+    ("submit", "travelling:submit", "Score maps that any tool has made."),
+):
+    main.add_lazily(name, f"benchmarks.commands.{place}", summary)
 
 
 @main.command()

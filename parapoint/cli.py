@@ -1,4 +1,4 @@
-"""The command `parapoint`: fit | map | unwrap | bake."""
+"""The command `parapoint`: unwrap | fit | map | bake."""
 
 from __future__ import annotations
 
@@ -7,21 +7,23 @@ from typing import Never
 
 import click
 
-from parapoint import console
-from parapoint.commands.bake import bake
-from parapoint.commands.fit import fit
-from parapoint.commands.map import map_
-from parapoint.commands.unwrap import unwrap
+from parapoint import __version__, console
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=console.LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="parapoint")
 def parapoint() -> None:
     """UV maps of point clouds and meshes."""
     logging.basicConfig(format="%(message)s")
 
 
-for command in (fit, map_, unwrap, bake):
-    parapoint.add_command(command)
+for name, place, summary in (
+    ("unwrap", "unwrap:unwrap", "Lay a mesh or a point cloud out in the unit square."),
+    ("fit", "fit:fit", "Find the map of a mesh or a point cloud and save it."),
+    ("map", "map:map_", "Apply a saved map to other points of its surface."),
+    ("bake", "bake:bake", "Paint what the points of a cloud know into a texture."),
+):
+    parapoint.add_lazily(name, f"parapoint.commands.{place}", summary)
 
 
 def main() -> Never:

@@ -1,10 +1,15 @@
-"""How every command of the project ends: one clear line and exit status 2 on wrong use or input."""
+"""How every command of the project starts and ends.
+
+A group imports a command when it runs, so that its help comes at once. Wrong use and bad input end
+with one clear line and exit status 2.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import importlib
 import sys
-from typing import Never
+from typing import Any, Never
 
 import click
 
@@ -14,6 +19,43 @@ LONGEST_MESSAGE = 2000
 """Characters of a message that are printed."""
 LONGEST_NAME = 200
 """Characters of a name that are shown."""
+
+
+class LazyGroup(click.Group):
+    """A group of commands, each of which is imported when it is asked for by name.
+
+    Until then a placeholder stands for it in the group's help.
+    """
+
+    def __init__(self, *arguments: Any, **settings: Any) -> None:
+        """A group without commands; the arguments are those of `click.Group`."""
+        super().__init__(*arguments, **settings)
+        self._places: dict[str, str] = {}
+
+    def add_lazily(self, name: str, place: str, summary: str) -> None:
+        """Add the command at `place`, such as "package.module:command".
+
+        Args:
+            name: what it is called by.
+            place: where it is.
+            summary: the first sentence of its help.
+        """
+        self._places[name] = place
+        self.add_command(click.Command(name, short_help=summary))
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 (click's signature)
+        """The names of the commands, in the order in which they were added."""
+        return list(self.commands)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command that the arguments begin with, imported, and the other arguments."""
+        name, command, rest = super().resolve_command(ctx, args)
+        if name in self._places:
+            module, _, attribute = self._places[name].partition(":")
+            command = getattr(importlib.import_module(module), attribute)
+        return name, command, rest
 
 
 def printable(text: str, longest: int = LONGEST_NAME) -> str:
@@ -36,9 +78,19 @@ def printable(text: str, longest: int = LONGEST_NAME) -> str:
 
 
 def run(command: click.Command, arguments: list[str] | None = None) -> Never:
-    """Run a click command and exit: 0 or the command's own status, 2 with one line on bad input."""
+    """Run a click command and exit.
+
+    The status is 0 or the command's own, and 2 with one line on bad input. A command that needs
+    arguments and gets none prints its whole help, with status 2, too.
+    """
     try:
         status = command.main(arguments, standalone_mode=False)
+    except click.exceptions.NoArgsIsHelpError as error:
+        print(error.format_message(), file=sys.stderr)
+        sys.exit(2)
+    except click.UsageError as error:
+        more = "" if error.ctx is None else f" (see: {error.ctx.command_path} --help)"
+        fail(error.format_message().removesuffix(".") + more)
     except click.ClickException as error:
         fail(error.format_message())
     except (InputError, OSError) as error:

@@ -25,7 +25,7 @@ ALIKE = 1e-3
 """Most that a measure of the map of a similar surface differs by; more only if seeds do."""
 OTHER_SEEDS = (1, 2, 3)
 SEEDS_APART = 2.0
-"""The range of the measures over a few seeds counts so many times: there are more seeds."""
+"""Factor on the range of the measures over a few seeds, since other seeds may differ by more."""
 """Seed of the methods and of the surfaces that they are checked on."""
 THINNEST = 1e-9
 """Ratio of a map's width to its length up to which it counts as collapsed to a line."""
@@ -323,7 +323,7 @@ def _check_similar(
 
 
 def similar(surface: Surface, shift: float, scale: float) -> Surface:
-    """The surface moved by so many times its size along each axis, then scaled."""
+    """The surface moved by `shift` times its size along each axis, then scaled."""
     points = surface.vertices if isinstance(surface, Mesh) else surface.points
     moved = scale * (points + shift * float(np.ptp(points, axis=0).max()))
     if isinstance(surface, Mesh):

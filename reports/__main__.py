@@ -7,15 +7,18 @@ from pathlib import Path
 import click
 
 from benchmarks.running.environment import cores
-from parapoint import console
+from parapoint import __version__, console
 
 
 @click.command(
+    no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
     help=(
         "Write tables, figures and index.html for the results in DIR to DIR/report. With "
         "--against, write what moved since OTHER to DIR/report/history instead."
-    )
+    ),
 )
+@click.version_option(__version__, prog_name="parapoint reports")
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 @click.option("--exports", is_flag=True, help="Every map as a textured OBJ and GLB, too.")
 @click.option(

@@ -19,7 +19,7 @@ from benchmarks.metrics.grades import grade_of
 from benchmarks.metrics.table import METRICS
 from benchmarks.store import measuring
 from benchmarks.store.results import Store
-from benchmarks.store.rows import ResultRow
+from benchmarks.store.rows import SUBMITTED, ResultRow
 from parapoint.console import LONGEST_MESSAGE, printable
 from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import Parameterization
@@ -154,11 +154,14 @@ def labels(rows: Iterable[ResultRow]) -> dict[tuple[str, str], Label]:
     params = {
         key: {n: v for n, v in by_key[key][0].params.items() if n != "device"} for key in keys
     }
+    submitted = {key: str(params[key].pop("name", "")) for key in keys if key[0] == SUBMITTED}
     found: dict[tuple[str, str], Label] = {}
     for key in keys:
         method = key[0]
         preset = params[key].get("preset")
         name, fixed = DISPLAY.get(f"{method}(preset={preset})", DISPLAY.get(method, (method, "")))
+        if method == SUBMITTED:
+            name, fixed = submitted[key], "submitted maps"
         siblings = [params[other] for other in keys if other[0] == method and other != key]
         differing = [
             entry

@@ -144,7 +144,9 @@ def test_a_command_of_the_readme_works_as_printed(words, place):
     if "pip" in words:
         return
     if {"--texture", "bake"}.intersection(words):  # a large texture takes its time: read alone
-        cli.parapoint.commands[words[1]].make_context(words[1], words[2:])
+        with click.Context(cli.parapoint) as context:
+            command = cli.parapoint.resolve_command(context, words[1:])[1]
+        command.make_context(words[1], words[2:])
         return
     if "results/new" in words:
         for name in ("new", "old"):

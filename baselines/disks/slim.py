@@ -26,9 +26,9 @@ from parapoint.surfaces.parameterization import Parameterization, TracePoint
 from parapoint.surfaces.surface import FloatArray, IntArray, Surface
 
 NUDGE = 1e-5
-"""Corners move so far for a difference quotient of the energy, in typical edges."""
+"""How far corners move for a difference quotient of the energy, in typical edges."""
 HALVINGS = 40
-"""Steps down the slope that are tried: the extent of the map, halved so many times."""
+"""Steps down the slope that are tried: the extent of the map, halved up to this many times."""
 ROUNDING = 1e-9
 """Relative fall of an energy that counts as none."""
 

@@ -31,7 +31,8 @@ import pooch
 
 from benchmarks.cases.builtin import BUILTIN, sampled
 from parapoint.errors import InputError
-from parapoint.files.reading import FORMATS, read_surface
+from parapoint.files.reading import FORMATS, read_parameterized, read_surface
+from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh, PointCloud, Surface
 
 MIRROR = "PARAPOINT_DATA"
@@ -237,6 +238,16 @@ def exact_points(case: str) -> PointCloud | None:
         return None
     cloud, exact = _sampled(name)
     return exact if (cloud.points != exact.points).any() else None
+
+
+def reference(case: str) -> Parameterization | None:
+    """The UV map that the model of a case came with; None if it came with none.
+
+    Raises:
+        InputError: as for `load`.
+    """
+    model = info(case)
+    return read_parameterized(path(case))[1] if model and model.has_uv else None
 
 
 def info(case: str) -> Model | None:

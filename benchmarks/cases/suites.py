@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import difflib
+import hashlib
+import json
 from dataclasses import dataclass
 
 from benchmarks.cases.builtin import BUILTIN
@@ -20,6 +22,7 @@ class Suite:
         cases: canonical names of models, in the order of the rows.
         methods: specs, `name` or `name(key=value, ...)`, in the order of the columns.
         seeds: the seeds of each case and method.
+        version: raised by one when the cases or the seeds change once results are published.
     """
 
     name: str
@@ -27,6 +30,14 @@ class Suite:
     cases: tuple[str, ...]
     methods: tuple[str, ...]
     seeds: tuple[int, ...] = (0,)
+    version: int = 1
+
+    @property
+    def digest(self) -> str:
+        """16 hexadecimal digits over what makes results comparable: cases, their files, seeds."""
+        files = [registry()[name].sha256 if name in registry() else "" for name in self.cases]
+        text = json.dumps([self.name, self.version, self.cases, files, self.seeds])
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 ISOMETRIC = "slim(energy=symmetric_dirichlet)"

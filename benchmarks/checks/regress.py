@@ -145,7 +145,7 @@ COMPARISONS = (SOLVERS, COMPUTED, TRAINED)
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How far a metric may move: by absolute + relative * golden value; and why so far."""
+    """How far a metric may move, absolute + relative * golden value, and the reason."""
 
     relative: float
     absolute: float

@@ -331,7 +331,7 @@ def _text(points: FloatArray) -> bytes:
 def _has_strays(path: Path, count: int) -> bool:
     """Whether this many rows are left out, and all others are on the surface that is found."""
     report = ComputedMap().fit(read_surface(path)).report_
-    return report["strays"] == count and report["anchors"] == report["points"]
+    return report["strays"] == count and report["missed"] == 0
 
 
 def scan_lines() -> Iterator[Case]:

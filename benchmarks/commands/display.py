@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
@@ -222,11 +222,16 @@ def _say(line: str) -> None:
     print(printable(line, LONGEST_MESSAGE), flush=True)
 
 
-def print_table(table: Table) -> None:
-    """Print a table: drawn on a terminal, and as tab-separated lines anywhere else."""
+def print_table(table: Table, drawn: Callable[[Table], RenderableType] | None = None) -> None:
+    """Print a table: drawn on a terminal, and as tab-separated lines anywhere else.
+
+    Args:
+        table: the table.
+        drawn: makes of it what a terminal shows; the table itself if None.
+    """
     console = Console()
     if console.is_terminal:
-        console.print(table)
+        console.print(table if drawn is None else drawn(table))
         return
     if table.title:
         print(table.title)

@@ -33,7 +33,7 @@ WIDTH = 160
 """Width of the tables in characters if the output is not a terminal."""
 
 
-@click.command()
+@click.command(no_args_is_help=True)
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option(
     "--reference", type=click.Path(path_type=Path), help="Another map of the same faces: its UV."
@@ -44,10 +44,11 @@ WIDTH = 160
     "--heatmap", type=click.Path(path_type=Path), metavar="OUT.png", help="Draw the distortion."
 )
 def score(file: Path, *, reference: Path | None, as_json: bool, heatmap: Path | None) -> None:
-    """Grade and metrics of the UV map in FILE: OBJ with vt, GLB, PLY or NPZ, of a mesh or a cloud.
+    """Grade and metrics of any UV map.
 
-    Polygons are triangulated first; faces are the triangles, numbered from 0 in the file's order.
-    JSON has no infinity: an infinite value is the string "inf".
+    FILE is an OBJ with vt, a GLB, a PLY or an NPZ, of a mesh or a cloud. Polygons are triangulated
+    first; faces are the triangles, numbered from 0 in the file's order. JSON has no infinity:
+    an infinite value is the string "inf".
     """
     given = [file] if reference is None else [file, reference]
     picture = None if heatmap is None else checked_picture(heatmap, inputs=given)

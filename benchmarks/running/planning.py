@@ -26,7 +26,7 @@ from benchmarks.store.rows import (
     identity,
 )
 from parapoint.errors import InputError
-from parapoint.files.reading import faults_of, read_parameterized
+from parapoint.files.reading import faults_of
 from parapoint.parameters import LARGEST_SEED, check_whole
 from parapoint.sources import source_hash
 
@@ -151,9 +151,8 @@ def surfaces(store: Store, cases: Sequence[str]) -> tuple[dict[str, str], dict[s
         hashes[case] = store.add_surface(surface)
         if (exact := models.exact_points(case)) is not None:
             store.add_exact(hashes[case], exact)
-        model = models.info(case)
-        if model and model.has_uv:
-            store.add_reference(hashes[case], read_parameterized(models.path(case))[1])
+        if (reference := models.reference(case)) is not None:
+            store.add_reference(hashes[case], reference)
         if origin:
             known[origin] = hashes[case]
     if known != before:

@@ -1,8 +1,8 @@
 """Runs the cells of a suite that a results folder lacks, each in a process of its own.
 
-The process of the run plans (`benchmarks.running.planning`), workers the cells to an executor
-(`benchmarks.running.executors`), and alone writes rows. It may be killed at any time: a cell that
-has its row is done, and the same call goes on with the others.
+The process of the run plans the cells (`benchmarks.running.planning`), hands them to an executor
+(`benchmarks.running.executors`), and is the only one to write rows. It may be killed at any time: a
+cell that has its row is done, and the same call goes on with the others.
 """
 
 from __future__ import annotations
@@ -17,26 +17,20 @@ from pathlib import Path
 
 from benchmarks.cases.suites import Suite
 from benchmarks.metrics.table import METRICS
-from benchmarks.running import environment, executors, planning, scratch
+from benchmarks.running import environment, executors, planning, scoring, scratch
 from benchmarks.running.planning import Cell, Chosen
-from benchmarks.running.tasks import Executor, MeasureJob, Outcome, RunJob, Task
-from benchmarks.store import measuring
+from benchmarks.running.tasks import Executor, Outcome, RunJob, Task
+from benchmarks.store import measuring, versions
 from benchmarks.store.results import Store
 from benchmarks.store.rows import ResultRow
 from parapoint.parameters import LONGEST_SECONDS, check_number, check_whole
 
 TIME_LIMIT = 1800.0
 """Wall time in seconds that a cell may take, where the user sets no other limit."""
-METRICS_TIME_LIMIT = 120.0
-"""Wall time in seconds that the metrics of one map may take; 100,000 faces take a few seconds."""
-MEMORY_SHARE = 0.8
-"""Fraction of the machine's memory that all cells together may hold, if the user sets no limit."""
 MOST_JOBS = 4096
 """Most cells that may be asked to run at a time."""
 MOST_MEMORY = 1e6
 """Most memory, in GB, that a cell may be allowed to hold."""
-MAPS_PER_WORKER = 4
-"""Maps to measure that justify another supervisor, which takes a second to start."""
 
 
 @dataclass
@@ -136,8 +130,8 @@ def run(
         executor: where cells run, as `executors.executor` says.
         jobs: how many cells run at a time. More than one is faster, and makes timings less honest.
         timeout: wall time in seconds that a cell may take.
-        memory: GB that a cell's processes may hold together. None divides MEMORY_SHARE of the
-            machine's memory by `jobs`; only the local executor can do so.
+        memory: GB that a cell's processes may hold together. None divides a part
+            of the machine's (`scoring.MEMORY_SHARE`) by `jobs`; only the local executor can do so.
         progress: hears how the run goes.
 
     Raises:
@@ -157,7 +151,7 @@ def run(
         executor, store.folder / scratch.NAME, jobs=jobs, memory=memory, tick=progress.tick
     )
     planning.check_readable(cases or (), store)
-    memory_limit = _memory_limit(memory, jobs)
+    memory_limit = scoring.memory_limit(memory, jobs)
     summary = Summary(suite, chosen, jobs=jobs)
     with store.writing(), workers:
         hashes, summary.missing = planning.surfaces(store, suite.cases)
@@ -169,7 +163,7 @@ def run(
         planning.mend(store, todo)
         progress.planned(summary)
         if todo:
-            number = store.add_run(here | {"suite": suite.name})
+            number = store.add_run(here | versions.noted(suite.name))
             book = _Book(store, number, summary, progress)
             tasks = []
             for cell in todo:
@@ -188,32 +182,10 @@ def run(
 def _measure(
     store: Store, workers: Executor, memory: float | None, summary: Summary, progress: Progress
 ) -> None:
-    """Bring the metrics up to date. Each map has a process of its own: a wild one may kill it."""
-    rows = measuring.unmeasured(store)
-    values: dict[str, dict[str, float]] = {}
-    jobs = min(workers.width, 1 + len(rows) // MAPS_PER_WORKER)
-    memory_limit = _memory_limit(memory, jobs)
-
-    def began() -> None:
-        progress.measured(len(values), len(rows))
-
-    def ended(row: ResultRow, outcome: Outcome, _: Path) -> None:
-        values[row.id] = dict(outcome.metrics)
-        if outcome.status != "ok":
-            summary.unmeasured[row.id] = outcome.reason
-        progress.measured(len(values), len(rows))
-
-    tasks = []
-    for row in rows:
-        job = MeasureJob(
-            surface=store.scored_path(row.surface_hash),
-            reference=_reference(store, row),
-            uv=store.uv_path(row.id),
-            time_limit=METRICS_TIME_LIMIT,
-            memory_limit=memory_limit,
-        )
-        tasks.append(Task(job, began, functools.partial(ended, row)))
-    workers.run(tasks, jobs)
+    """Bring the metrics up to date, and note those of the run's rows."""
+    values, summary.unmeasured = scoring.scores(
+        store, measuring.unmeasured(store), workers, memory, progress.measured
+    )
     table = measuring.metrics(store, values)
     ids = {row.id for row in summary.rows if row.status == "ok"}
     known = table[table["id"].isin(ids)]
@@ -230,7 +202,7 @@ def _job(
     """The job that runs a cell."""
     return RunJob(
         surface=store.surface_path(cell.row.surface_hash),
-        reference=_reference(store, cell.row),
+        reference=scoring.reference(store, cell.row),
         time_limit=time_limit,
         memory_limit=memory_limit,
         spec=cell.method.spec,
@@ -238,17 +210,6 @@ def _job(
         source_hash=cell.row.source_hash,
         plugins=tuple(_absolute(plugin) for plugin in plugins),
     )
-
-
-def _memory_limit(memory: float | None, jobs: int) -> float:
-    """Bytes that a job may hold: `memory` in GB, or its part of the machine's memory."""
-    return memory * 1e9 if memory else MEMORY_SHARE * environment.memory() / jobs
-
-
-def _reference(store: Store, row: ResultRow) -> Path | None:
-    """The file of the map that the row's model came with; None if it came with none."""
-    path = store.reference_path(row.surface_hash)
-    return path if path.exists() else None
 
 
 def _absolute(plugin: str) -> str:

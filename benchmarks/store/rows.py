@@ -24,6 +24,9 @@ MISSING = "not installed: "
 MACHINE = "through no fault of the method: "
 """How the reason begins where this machine failed, by a full disk or a damaged file; the next run
 tries again."""
+SUBMITTED = "submitted"
+"""The method of rows whose maps somebody else has made (`benchmarks.store.submissions`); what it is
+called is its parameter `name`."""
 KILLED = ("SIGHUP", "SIGINT", "SIGQUIT", "SIGKILL", "SIGTERM")
 """Signals that come from outside, as a rule: a cell that one of them has ended is tried again."""
 WATCHER_KILLED = "the process that watched over it was killed"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from benchmarks.store.archives import arrays_hash, map_arrays, read_surface, surface_arrays
 from benchmarks.store.measuring import metrics_keys, row_metrics, stored_table, values_by_key
@@ -29,6 +29,12 @@ def faults(store: Store, sample: int = 20) -> Iterator[str]:
         if row_of(line) is None:
             yield f"runs.jsonl, line {number}: no whole row"
     rows = store.rows()
+    yield from file_faults(store, rows)
+    yield from _metric_faults(store, rows, sample)
+
+
+def file_faults(store: Store, rows: Sequence[ResultRow]) -> Iterator[str]:
+    """What is wrong with the files of some rows, one line each: hashes, shapes, finite values."""
     sizes: dict[str, int] = {}
     for surface_hash in dict.fromkeys(row.surface_hash for row in rows if row.surface_hash):
         try:
@@ -42,7 +48,6 @@ def faults(store: Store, sample: int = 20) -> Iterator[str]:
     for row in rows:
         for fault in _row_faults(store, row, sizes.get(row.surface_hash)):
             yield f"{row.case}, {row.method}, seed {row.seed} ({row.id}): {fault}"
-    yield from _metric_faults(store, rows, sample)
 
 
 def _row_faults(store: Store, row: ResultRow, size: int | None) -> Iterator[str]:

@@ -27,11 +27,11 @@ from parapoint.textures.baking import (
 from parapoint.textures.placing import Placing
 
 
-@click.command()
-@click.argument("model", metavar="MODEL")
-@click.argument("cloud", metavar="CLOUD")
-@click.option("--out", required=True, metavar="FILE", help="FILE.png.")
-@click.option("--map", "kind", required=True, help=f"{', '.join(MAPS)}.")
+@click.command(no_args_is_help=True, options_metavar="[OPTIONS] --map KIND --out FILE")
+@click.argument("model", type=click.Path(), metavar="MODEL")
+@click.argument("cloud", type=click.Path(), metavar="CLOUD")
+@click.option("--out", type=click.Path(), required=True, metavar="FILE", help="FILE.png.")
+@click.option("--map", "kind", required=True, metavar="KIND", help=f"{', '.join(MAPS)}.")
 @click.option("--texture", type=int, default=TEXTURE, show_default=True, help="Texels a side.")
 @click.option("--margin", type=int, default=MARGIN, show_default=True, help="In texels.")
 @click.option("--force", is_flag=True, help="Replace files of yours that are in the way.")
@@ -48,7 +48,7 @@ def bake(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Paint what the points of CLOUD know into a texture of MODEL.
+    """Paint what the points of a cloud know into a texture.
 
     MODEL is a folder of `fit`, or a mesh with UVs, of the same surface. CLOUD may have any number
     of points. Of a folder the texture fits the UVs that `map` writes. A normal map is in tangent

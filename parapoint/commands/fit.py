@@ -14,9 +14,9 @@ from parapoint.commands.memory import memory_option
 from parapoint.files.reading import read_surface
 
 
-@click.command()
-@click.argument("surface", metavar="INPUT")
-@click.option("--out", required=True, metavar="DIR", help="Folder of the model.")
+@click.command(no_args_is_help=True, options_metavar="[OPTIONS] --out DIR")
+@click.argument("surface", type=click.Path(), metavar="INPUT")
+@click.option("--out", type=click.Path(), required=True, metavar="DIR", help="Folder of the model.")
 @click.option("--preset", default="computed", show_default=True, help="computed, learned or paper.")
 @click.option("--points", type=int, help="Most points that the map is fitted to.")
 @click.option("--iterations", type=int, help="Training steps.")
@@ -41,9 +41,9 @@ from parapoint.files.reading import read_surface
 @memory_option
 @click.option("--json", "as_json", is_flag=True, help="Print the report as one JSON object.")
 def fit(surface: str, out: str, preset: str, as_json: bool, **settings: Any) -> None:
-    """Find the map of a mesh or a point cloud and save it in DIR.
+    """Find the map of a mesh or a point cloud and save it.
 
-    The state of a training is saved there each minute: the same command goes on after a kill.
+    The state of a training is saved in DIR each minute: the same command goes on after a kill.
     """
     model = estimator_of(preset, settings)
     for stem in ("model", "checkpoint"):

@@ -11,19 +11,22 @@ from parapoint.commands.output import target, write
 from parapoint.files.reading import read_surface
 
 
-@click.command("map")
-@click.argument("model", metavar="DIR")
-@click.argument("surface", metavar="INPUT")
-@click.option("--out", required=True, metavar="FILE", help="FILE.obj, .ply or .npz.")
+@click.command("map", no_args_is_help=True, options_metavar="[OPTIONS] --out FILE")
+@click.argument("model", type=click.Path(), metavar="DIR")
+@click.argument("surface", type=click.Path(), metavar="INPUT")
+@click.option(
+    "--out", type=click.Path(), required=True, metavar="FILE", help="FILE.obj, .ply or .npz."
+)
 @click.option("--device", default="auto", show_default=True, help="auto, cpu or cuda.")
 @click.option("--force", is_flag=True, help="Replace files of yours that are in the way.")
 @memory_option
 @click.option("--json", "as_json", is_flag=True, help="Print the report as one JSON object.")
 def map_(model: str, surface: str, out: str, device: str, *, force: bool, as_json: bool) -> None:
-    """Apply the model in DIR to other points of its surface, or to a mesh of it.
+    """Apply a saved map to other points of its surface.
 
-    The fitted points fill the unit square. A mesh written as OBJ is cut along the seams of the
-    map: a face that lies across one keeps its shape and stays on one side.
+    DIR is a folder of `fit`, INPUT a cloud or a mesh of the same surface. The fitted points fill
+    the unit square. A mesh written as OBJ is cut along the seams of the map: a face that lies
+    across one keeps its shape and stays on one side.
     """
     out = target(out, surface, force=force, textured=False)
     from parapoint.estimator import load

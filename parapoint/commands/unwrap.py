@@ -18,9 +18,15 @@ from parapoint.textures.baking import MARGIN, check_size
 from parapoint.textures.placing import BORDER
 
 
-@click.command()
-@click.argument("surface", metavar="INPUT")
-@click.option("--out", required=True, metavar="FILE", help="FILE.glb, .obj, .ply or .npz.")
+@click.command(no_args_is_help=True, options_metavar="[OPTIONS] --out FILE")
+@click.argument("surface", type=click.Path(), metavar="INPUT")
+@click.option(
+    "--out",
+    type=click.Path(),
+    required=True,
+    metavar="FILE",
+    help="FILE.glb, .obj, .ply or .npz.",
+)
 @click.option("--time-budget", type=float, metavar="S", help="Seconds at most.")
 @click.option(
     "--components",
@@ -54,7 +60,7 @@ def unwrap(
     max_distortion: float | None,
     **settings: Any,
 ) -> None:
-    """Compute the map of a mesh or a point cloud and write it, in the unit square.
+    """Lay a mesh or a point cloud out in the unit square.
 
     A mesh is cut along a clean path of its edges and laid out without flips or overlaps. An OBJ
     file written as OBJ keeps all its lines but for the UVs; without materials of its own it gets a

@@ -102,12 +102,12 @@ class ComputedMap(Estimator):
             few = min(count, max(FEWEST_POINTS, round(TRIAL_PER_SECOND * budget)))
             drawn = _computed_within(surface, few, count, self, deadline)
         flat, cloud = _as_the_normals(drawn.flat, drawn, surface), drawn.cloud
-        if missing := len(cloud) - len(flat.anchors):
+        if len(flat.missed):
             logger.warning(
                 "%d of %d points are not on the surface that was found%s",
-                missing,
+                len(flat.missed),
                 len(cloud),
-                _rows_of(np.delete(cloud, flat.anchors, axis=0), drawn.frame, surface),
+                _rows_of(cloud[flat.missed], drawn.frame, surface),
             )
         cut_short = time.monotonic() > deadline
         if cut_short:
@@ -119,6 +119,7 @@ class ComputedMap(Estimator):
         report: dict[str, object] = {
             "points": len(drawn.points),
             "anchors": len(flat.anchors),
+            "missed": len(flat.missed),
             "found": flat.facts,
             "cut_short": cut_short,
             "seconds": round(time.monotonic() - begun, 3),

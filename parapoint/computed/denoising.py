@@ -24,7 +24,7 @@ WIDTH = 0.5
 PASSES = 2
 """How often each point is moved."""
 FEWEST = 200
-"""Clouds of fewer points stay as they are."""
+"""A cloud of fewer points is not moved."""
 
 
 def denoised(points: FloatArray) -> FloatArray:

@@ -1,11 +1,10 @@
 """A map of a bare cloud with short seams, computed without training.
 
-The cloud is triangulated, cut, and flattened by a bijective map. The cuts lead to where the scale
-of a conformal map, found by a linear solve, is most extreme (as in Sawhney and Crane 2017,
-"Boundary first flattening", section 6), and are as long as an even scale needs, and to what would
-be too small for numbers without. The map is laid out by that scale (`parapoint.computed.layout`),
-then made bijective (`parapoint.planar.bijection`) and, unless it is to be conformal at any cost,
-such that every part keeps its area (`parapoint.computed.parts`).
+The cloud is thinned where it is scanned in lines (`parapoint.surfaces.scan_lines`), triangulated,
+cut open (`parapoint.computed.seams`), and laid out by the scale of a conformal map
+(`parapoint.computed.layout`). The map is then made bijective (`parapoint.planar.bijection`) and,
+unless it is to be conformal at any cost, such that every part keeps its area
+(`parapoint.computed.parts`).
 """
 
 from __future__ import annotations
@@ -14,34 +13,24 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.sparse import csgraph
 
 from parapoint.computed.denoising import denoised
 from parapoint.computed.layout import scaled_layout
 from parapoint.computed.parts import Distortion, parts_kept
 from parapoint.computed.reconstruction import ReconstructionError, defects, triangulation
-from parapoint.computed.scale import area_discrepancy, even_scale, log_scale, mapped_areas, turning
+from parapoint.computed.scale import even_scale
+from parapoint.computed.seams import seamed
 from parapoint.planar.bijection import bijective_map
-from parapoint.planar.embedding import embeddable, few_edges_graph, path_edges
 from parapoint.surfaces.areas import signed_areas
-from parapoint.surfaces.cutting import (
-    cut_along,
-    cut_to_disk,
-    origin,
-)
+from parapoint.surfaces.cutting import origin
 from parapoint.surfaces.parameterization import Charted, Parameterization
+from parapoint.surfaces.scan_lines import Lines, thinned
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 
-AREA_DISCREPANCY = 0.6
-"""Cuts are added until the predicted total area discrepancy is this small."""
-OPEN_SEAM, CLOSED_SEAM = 0.022, 0.037
-"""Most seam edges, as a fraction of the faces, on surfaces with and without boundary."""
 FEWER_DEFECTS = 0.5
 """Share of its defects that a triangulation keeps at most where the points are noisy: 0.06 to 0.2
 with noise of 0.5 and 1 % of the diagonal, 0.6 to 3 on models with details as fine as the
 spacing."""
-TIPS = 3
-"""Extremal points that are tried as the tip of each cut."""
 LONELY = 6.0
 """Cost of a vertex most of whose edges cross the seam, in such edges' share."""
 SWEEPS = 10
@@ -55,6 +44,7 @@ class FlatMap(NamedTuple):
 
     Attributes:
         anchors: (A,) rows of the cloud.
+        missed: (B,) rows that the triangulation did not reach.
         uv: (A, 2) images; the map keeps the total area.
         jacobians: (A, 2, 3) d uv / d x.
         inverse_jacobians: (A, 3, 2) d x / d uv.
@@ -64,6 +54,7 @@ class FlatMap(NamedTuple):
     """
 
     anchors: IntArray
+    missed: IntArray
     uv: FloatArray
     jacobians: FloatArray
     inverse_jacobians: FloatArray
@@ -86,6 +77,7 @@ class Flattened(NamedTuple):
 
     Attributes:
         rows: (A,) rows of the cloud that the triangulation reached.
+        missed: (B,) rows that it did not reach; those in neither were thinned out.
         mesh: the triangulation of these A points.
         disk: the mesh cut to a planar domain of M vertices.
         origin: (M,) the vertex of `mesh` that each one of `disk` is or copies.
@@ -94,6 +86,7 @@ class Flattened(NamedTuple):
     """
 
     rows: IntArray
+    missed: IntArray
     mesh: Mesh
     disk: Mesh
     origin: IntArray
@@ -116,25 +109,29 @@ def flattened(
 
     Raises:
         ReconstructionError: the points show no surface that can be followed and flattened.
+        InputError: the points lie on lines too far apart.
     """
-    mesh, is_denoised = _still(points)
+    lines = thinned(points)
+    rows = np.arange(len(points)) if lines is None else lines.rows
+    mesh, is_denoised = _still(points[rows], lines)
     reached = np.flatnonzero(mesh.referenced)
-    if len(reached) < LEAST_PART * len(points):
+    if len(reached) < LEAST_PART * len(rows):
         raise ReconstructionError(
-            f"the largest component holds {len(reached)} of {len(points)} points"
+            f"the largest component holds {len(reached)} of {len(rows)} points"
         )
-    row = np.full(len(points), -1, dtype=np.int64)
+    row = np.full(len(rows), -1, dtype=np.int64)
     row[reached] = np.arange(len(reached))
+    missed = rows[~mesh.referenced]
     mesh = Mesh(mesh.vertices[reached], row[mesh.faces])
     try:
-        disk = _seamed(mesh)
+        disk = seamed(mesh, distortion)
         uv = bijective_map(disk, _layout(disk), deadline)
         disk, uv = parts_kept(disk, uv, distortion, deadline)
     except (RuntimeError, np.linalg.LinAlgError) as error:  # a singular factor, no bijection
         raise ReconstructionError(f"the triangulation has no flat map ({error})") from None
     uv -= (uv.max(axis=0) + uv.min(axis=0)) / 2
     uv *= np.sqrt(disk.face_areas.sum() / signed_areas(uv, disk.faces).sum())
-    return Flattened(reached, mesh, disk, origin(mesh, disk), uv, is_denoised)
+    return Flattened(rows[reached], missed, mesh, disk, origin(mesh, disk), uv, is_denoised)
 
 
 def flat_map(
@@ -160,38 +157,27 @@ def flat_map(
         "faces": len(flat.mesh.faces),
         "seam_edges": (boundary[1] - boundary[0]) // 2,
         "denoised": flat.is_denoised,
+        "thinned": len(points) - len(flat.rows) - len(flat.missed),
         "distortion": distortion,
     }
     inverse: FloatArray = np.asarray(np.linalg.pinv(jacobians, rcond=0.1), dtype=np.float64)
     charted = Charted(flat.mesh, Parameterization(flat.uv, flat.disk.faces))
-    return FlatMap(flat.rows, flat.uv[chosen], jacobians, inverse, facts, charted)
+    return FlatMap(flat.rows, flat.missed, flat.uv[chosen], jacobians, inverse, facts, charted)
 
 
-def _still(points: FloatArray) -> tuple[Mesh, bool]:
-    """A triangulation of points (N, 3), and whether it is of the denoised ones.
+def _still(points: FloatArray, lines: Lines | None) -> tuple[Mesh, bool]:
+    """A triangulation of points (N, 3), perhaps on lines, and whether it is of denoised ones.
 
     Details as fine as the spacing look like noise. So that they stay, the denoised points are taken
     only where most defects of the triangulation go with the noise.
     """
-    mesh, moved = triangulation(points), denoised(points)
+    mesh, moved = triangulation(points, lines), denoised(points)
     if moved is points:
         return mesh, False
-    smooth = triangulation(moved)
+    smooth = triangulation(moved, lines)
     if defects(smooth) > FEWER_DEFECTS * defects(mesh):
         return mesh, False
     return smooth, True
-
-
-def _seamed(mesh: Mesh) -> Mesh:
-    """The mesh cut to a planar domain whose flat map has the scale that is asked for."""
-    share = OPEN_SEAM if mesh.boundary_loops else CLOSED_SEAM
-    budget = int(share * len(mesh.faces))
-    opened = mesh
-    if mesh.genus > 0 or not mesh.boundary_loops:
-        opened = cut_to_disk(mesh)
-    opened = _joined_loops(opened)
-    opened = _scale_cuts(opened, budget - (len(opened.vertices) - len(mesh.vertices)))
-    return embeddable(opened)
 
 
 def _layout(disk: Mesh) -> FloatArray | None:
@@ -202,67 +188,6 @@ def _layout(disk: Mesh) -> FloatArray | None:
     if len(disk.boundary_loops) > 1:
         return None
     return scaled_layout(disk, even_scale(disk))
-
-
-def _joined_loops(mesh: Mesh) -> Mesh:
-    """The planar domain cut between the boundary loops that a flat planar map cannot have.
-
-    In the flat metric an inner loop turns by −2π; one that turns otherwise, such as the end of a
-    tube, is joined to the nearest other loop.
-    """
-    while len(loops := mesh.boundary_loops) > 1:
-        turns = turning(mesh, log_scale(mesh, flat_loops=False))
-        wrong = np.abs(turns + 2 * np.pi)
-        wrong[turns.argmax()] = 0
-        worst = int(wrong.argmax())
-        if wrong[worst] < np.pi:
-            break
-        distance, previous, _ = csgraph.dijkstra(
-            few_edges_graph(mesh), indices=loops[worst], return_predecessors=True, min_only=True
-        )
-        others = np.concatenate([loop for i, loop in enumerate(loops) if i != worst])
-        mesh = cut_along(mesh, path_edges(previous, int(others[distance[others].argmin()])))
-    return mesh
-
-
-def _scale_cuts(mesh: Mesh, budget: int) -> Mesh:
-    """The planar domain cut from its boundary to where the scale is most extreme.
-
-    Extreme is what is far from the boundary and in its log scale from the mean area's. Of some such
-    tips the one with the largest gain for each cut edge is taken, until the area discrepancy is
-    small enough or `budget` edges are cut.
-    """
-    scale, area = log_scale(mesh), mesh.face_areas.sum()
-    discrepancy = area_discrepancy(mesh, scale)
-    while discrepancy > AREA_DISCREPANCY:
-        graph = few_edges_graph(mesh)
-        distance, previous, _ = csgraph.dijkstra(
-            graph,
-            indices=np.concatenate(mesh.boundary_loops),
-            return_predecessors=True,
-            min_only=True,
-        )
-        extreme = distance * np.abs(scale - np.log(mapped_areas(mesh, scale).sum() / area) / 2)
-        candidates = []
-        blocked = np.zeros(len(scale), dtype=bool)
-        for _ in range(TIPS):
-            tip = int(np.where(blocked, -1.0, extreme).argmax())
-            blocked |= np.isfinite(csgraph.dijkstra(graph, indices=tip, limit=distance[tip] / 2))
-            path = path_edges(previous, tip)
-            if not 0 < len(path) <= budget:
-                continue
-            cut = cut_along(mesh, path)
-            new_scale = log_scale(cut)
-            new_discrepancy = area_discrepancy(cut, new_scale)
-            gain = (discrepancy - new_discrepancy) / len(path)
-            candidates.append((gain, len(path), cut, new_scale, new_discrepancy))
-        if not candidates:
-            break
-        gain, length, cut, new_scale, new_discrepancy = max(candidates, key=lambda row: row[0])
-        if gain <= 0:
-            break
-        mesh, scale, discrepancy, budget = cut, new_scale, new_discrepancy, budget - length
-    return mesh
 
 
 def _vertex_jacobians(mesh: Mesh, uv: FloatArray) -> FloatArray:

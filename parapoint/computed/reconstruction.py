@@ -5,8 +5,7 @@ triangles of the 3D Delaunay complex those with small empty balls are candidates
 them one by one, the smoothest and smallest first. It only closes up on itself once nothing else is
 left to take, which keeps noise from growing handles.
 
-What is small is said in spacings: the distance to the nearest points, or to the next line where
-points are scanned in lines (`parapoint.surfaces.scan_lines`).
+What is small is said in spacings, the distance to the nearest points.
 
 Where two sheets are nearer to each other than their points are, no front tells them apart. One more
 front therefore takes only the triangles between inside and outside (`parapoint.computed.delaunay`),
@@ -30,8 +29,7 @@ from scipy.spatial import QhullError, cKDTree
 
 from parapoint.computed.delaunay import delaunay_complex, empty_radii, insideness
 from parapoint.computed.sheets import sheet_normals, sheet_triangles
-from parapoint.errors import InputError
-from parapoint.surfaces.scan_lines import NEAREST, breadth
+from parapoint.surfaces.scan_lines import NEAREST, Lines
 from parapoint.surfaces.surface import (
     BoolArray,
     FloatArray,
@@ -46,6 +44,12 @@ Vector = tuple[float, float, float]
 
 LOOSEST = 2.5
 """Largest empty ball of a candidate triangle, in spacings."""
+LEAP = 1.5
+"""Longest edge between two points of one scan line, in distances to the next line."""
+PASSES = -0.5
+"""An edge passes by a point from which the cosine between its ends is less."""
+BESIDE = 12
+"""The nearest points among which such are sought."""
 BEND_COSTS = (15.0, 2.0)
 """A front takes triangles by size times (1 + cost (1 − cosine of the bend)); each is tried."""
 SHARPEST = -0.8
@@ -53,13 +57,11 @@ SHARPEST = -0.8
 GLUE = 0.3
 """Least cosine between a triangle's normal and that of a vertex where the front meets itself."""
 TIGHTEST = 1.2
-"""Largest empty ball of a triangle that has a say in the normals, in spacings."""
+"""Triangles with a larger empty ball have no say in the normals; its radius, in spacings."""
 AGAINST = -0.3
 """Least cosine between a triangle along the sheets and any of the three normals at its corners."""
 DISAGREEMENT = 2.0
-"""Such a triangle counts as larger by so many times 1 − its mean cosine with them."""
-LONELY_LINES = 0.5
-"""Share of points that see no line beside their own at which there is no surface to be found."""
+"""Such a triangle counts as larger by this many times 1 − its mean cosine with them."""
 THINNEST = 1e-7
 """Least height of a triangle over its longest edge."""
 QUARTER = math.pi / 2
@@ -70,40 +72,48 @@ SMOOTHER = 0.97
 cross it leaves 0.98 or more. It is not tried where turns from sheet to sheet are fewer."""
 LONGEST_HOLE = 12
 """Edges of the largest hole that is filled."""
+LONGEST_HOLE_IN_LINES = 6
+"""The same in thinned scan lines, whose outermost ring may have few points."""
 HANDLE = 30
-"""A handle counts as so many boundary edges, folds or unused points where fronts are compared."""
+"""Where fronts are compared, a handle counts as this many boundary edges, folds or spare points."""
 
 
 class ReconstructionError(RuntimeError):
     """The cloud shows no surface that can be followed; the message says why."""
 
 
-def triangulation(points: FloatArray) -> Mesh:
+def triangulation(points: FloatArray, lines: Lines | None = None) -> Mesh:
     """The largest component of a manifold, oriented triangulation of distinct points (N, 3).
 
     The vertices are the points, in order; those in no face are not on the component.
 
+    Args:
+        points: the cloud.
+        lines: the thinned scan lines that they are on, if they are.
+
     Raises:
         ReconstructionError: there are no candidate triangles.
-        InputError: the points lie on lines too far apart.
     """
-    spacing = _spacing(points)
+    spacing: FloatArray = cKDTree(points).query(points, NEAREST + 1)[0][:, 1:].mean(axis=1)
     try:
         delaunay = delaunay_complex(points, spacing)
     except QhullError as error:
         raise ReconstructionError(f"Qhull: {str(error).splitlines()[0]}") from None
     triangles, radius = delaunay.triangles, empty_radii(delaunay)
     near = (radius < LOOSEST * spacing[triangles].max(axis=1)) & _has_area(points, triangles)
+    if lines is not None:
+        near &= ~_leaps(points, triangles, lines)
     if not near.any():
         raise ReconstructionError("no two neighbouring points span a triangle with a third")
     front, back = (insideness(delaunay) > 0)[delaunay.sides].T
     between = near & (front != back)
     outward = np.where(front[:, None], triangles[:, ::-1], triangles)
+    longest = LONGEST_HOLE if lines is None else LONGEST_HOLE_IN_LINES
     fronts = [_Front(points, triangles[near], radius[near], cost) for cost in BEND_COSTS]
     if between.any():
         args = points, outward[between], radius[between], BEND_COSTS[-1]
         fronts.append(_Front(*args, is_oriented=True))
-    best = min((_largest_part(points, front.grown()) for front in fronts), key=defects)
+    best = min((_largest_part(points, front.grown(), longest) for front in fronts), key=defects)
     tight = near & (radius < TIGHTEST * spacing[triangles].max(axis=1))
     bends = _bends(best)
     turns = bends[bends > SHARP].sum() / QUARTER
@@ -111,31 +121,27 @@ def triangulation(points: FloatArray) -> Mesh:
         return best
     normals = sheet_normals(points, triangles[tight], radius[tight], best)
     along = _along_sheets(points, normals, triangles[near], radius[near])
-    across = _largest_part(points, _Front(points, *along, BEND_COSTS[0], is_oriented=True).grown())
+    front_across = _Front(points, *along, BEND_COSTS[0], is_oriented=True)
+    across = _largest_part(points, front_across.grown(), longest)
     return across if roughness(across) < SMOOTHER * roughness(best) else best
 
 
-def _spacing(points: FloatArray) -> FloatArray:
-    """(N,) about how far apart points are; where they are on scan lines, how far these are apart.
+def _leaps(points: FloatArray, triangles: IntArray, lines: Lines) -> BoolArray:
+    """(T,) whether triangles (T, 3) reach across a ring of a scan, or from end to end of an arc.
 
-    Raises:
-        InputError: most points see no second line; no training would see more.
+    An edge between two points of one line is too long, or passes by a third point of that line.
     """
-    tree = cKDTree(points)
-    spacing: FloatArray = tree.query(points, NEAREST + 1)[0][:, 1:].mean(axis=1)
-    count = breadth(points)
-    if count is None:
-        return spacing
-    if (count == 0).mean() > LONELY_LINES:
-        raise InputError(
-            "the points lie on lines that are more than 50 times as far apart as the points on "
-            "them; keep every tenth point of each line, or scan more lines"
-        )
-    lines = np.flatnonzero(count > NEAREST)
-    for rank in np.unique(count[lines]):
-        rows = lines[count[lines] == rank]
-        spacing[rows] = tree.query(points[rows], [rank + 1])[0][:, 0]
-    return spacing
+    edges, edge, _ = edge_table(triangles)
+    (a, b), (line, gap) = edges.T, (lines.line, lines.gap)
+    length = np.linalg.norm(points[a] - points[b], axis=1)
+    is_along = (line[a] == line[b]) & (gap[a] > 0)
+    leaps = length > LEAP * np.maximum(gap[a], gap[b])
+    near = cKDTree(points).query(points, min(BESIDE, len(points)))[1][:, 1:]
+    for c in near[a].T:
+        there, back = points[a] - points[c], points[b] - points[c]
+        far = np.linalg.norm(there, axis=1) * np.linalg.norm(back, axis=1)
+        leaps |= (line[c] == line[a]) & (c != b) & ((there * back).sum(axis=1) < PASSES * far)
+    return np.asarray((leaps & is_along)[edge].reshape(-1, 3).any(axis=1))
 
 
 def _has_area(points: FloatArray, triangles: IntArray) -> BoolArray:
@@ -281,10 +287,10 @@ def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _largest_part(points: FloatArray, faces: IntArray) -> Mesh:
-    """The largest component of oriented faces as a manifold, its small holes filled."""
+def _largest_part(points: FloatArray, faces: IntArray, longest: int) -> Mesh:
+    """The largest component of oriented faces as a manifold, holes up to `longest` edges filled."""
     faces = _connected(points, _single_fans(faces))
-    loops = [loop for loop in Mesh(points, faces).boundary_loops if len(loop) <= LONGEST_HOLE]
+    loops = [loop for loop in Mesh(points, faces).boundary_loops if len(loop) <= longest]
     return Mesh(points, _connected(points, _single_fans(_filled(points, faces, loops))))
 
 

@@ -1,4 +1,4 @@
-"""What is known of points beside their places, under the names that files give it."""
+"""The attributes of points, such as colours and intensity, under the names that files give them."""
 
 from __future__ import annotations
 

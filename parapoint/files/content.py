@@ -85,7 +85,7 @@ def word_counts(text: bytes, line_count: int) -> IntArray:
 
 
 def numbers(text: bytes, kind: type[np.float64 | np.int64]) -> npt.NDArray[Any]:
-    """All numbers of a text; fast, since a mesh has a million of them.
+    """All numbers of a text, read fast, since a mesh has a million of them.
 
     Raises:
         ValueError: a word is no number; the message names it.
@@ -116,7 +116,7 @@ def strip_triangles(sizes: IntArray, corners: IntArray) -> IntArray:
 
 
 def welded(points: FloatArray) -> tuple[FloatArray, IntArray]:
-    """The distinct points in the order in which they first stand, and the row of each point.
+    """The distinct points in the order in which they first appear, and the row of each point.
 
     Points are one only where their coordinates are exactly equal; there is no tolerance that
     would be right for every file.

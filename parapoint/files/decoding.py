@@ -27,9 +27,9 @@ MARKS = {
 }
 """Byte order marks that begin a text, and its encoding."""
 DECODED_LEAST = 64 * 2**20
-"""Bytes that any file may decode to."""
+"""Every file may decode to this many bytes."""
 DECODED_TIMES = 32
-"""A larger file may decode to so many times its own size."""
+"""A file may also decode to this many times its own size."""
 
 _allowed: ContextVar[float] = ContextVar("_allowed", default=DECODED_LEAST)
 
@@ -56,7 +56,7 @@ def plain(data: bytes) -> bytes:
 
 
 def allow(size: float) -> None:
-    """Let every file decode to so many bytes, from here on, in place of DECODED_LEAST."""
+    """From here on let every file decode to `size` bytes, in place of DECODED_LEAST."""
     _allowed.set(max(size, DECODED_LEAST))
 
 

@@ -40,7 +40,10 @@ def las(data: bytes) -> Content:
     check_decoded(width * points, len(data))
     if compressed and not laspy.LazBackend.detect_available():
         raise InputError("is LAZ, which needs a decoder; pip install lazrs")
-    read = laspy.read(io.BytesIO(data))
+    try:
+        read = laspy.read(io.BytesIO(data))
+    except laspy.LaspyException as error:
+        raise InputError(f"cannot be read by laspy ({error})") from error
     kept = np.ones(len(read.points), dtype=bool)
     if len(kept):
         kept = ~np.isin(read.classification, NOISE) & (np.asarray(read.withheld) == 0)

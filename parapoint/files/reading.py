@@ -1,14 +1,16 @@
 """Surfaces and maps from files.
 
 Vertices and faces keep the order of the file (STL and glTF, which repeat vertices, are welded).
-Every fault of a file is one InputError that names it: each reader of bytes may raise InputError,
-ValueError, IndexError, KeyError, OverflowError, struct.error or TypeError on bytes that are no
-such file.
+Every fault of a file becomes one InputError that names the file. On bytes that are no such file a
+reader may raise InputError or any of UNREADABLE; whatever else is raised is a bug of ours.
 """
 
 from __future__ import annotations
 
 import logging
+import struct
+import zipfile
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -58,6 +60,12 @@ FORMATS: dict[str, Callable[[bytes, Path], Content]] = {
 """Reader of each file name ending; it gets the bytes and the folder of the file."""
 
 UV_FORMATS = (".obj", ".ply", ".glb", ".gltf", ".npz")
+
+UNREADABLE = (
+    *(ValueError, TypeError, LookupError, AttributeError, ArithmeticError, EOFError, RuntimeError),
+    *(struct.error, zlib.error, zipfile.BadZipFile),
+)
+"""What the readers and their libraries raise on bytes that are no file of their kind."""
 
 SMALLEST_MESH, LARGEST_MESH = 1e-70, 1e70
 """Sizes between which a mesh is read, in its own unit: areas and their squares are float64 numbers.
@@ -171,7 +179,7 @@ def read_parameterized(path: str | Path) -> tuple[Mesh, Parameterization]:
 
 @contextmanager
 def faults_of(path: Path) -> Iterator[None]:
-    """Whatever is wrong with a file while it is read becomes one InputError line that names it."""
+    """What is wrong with a file while it is read becomes one InputError that names the file."""
     try:
         yield
     except InputError as error:
@@ -180,10 +188,6 @@ def faults_of(path: Path) -> Iterator[None]:
         raise InputError(f"{path}: is too large for the memory of this machine") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except Exception as error:
-        kind = path.suffix.lstrip(".").upper()
-        detail = " ".join(str(error).split())[:200] or type(error).__name__
-        raise InputError(f"{path}: is no {kind} file that can be read ({detail})") from error
 
 
 def read_point_map(path: str | Path) -> tuple[PointCloud, PointParameterization]:
@@ -233,7 +237,32 @@ def _content(path: Path) -> Content:
     if not path.is_file():
         raise InputError("is not a regular file")
     data = path.read_bytes()
-    return reader(data if path.suffix.lower() == ".npz" else plain(data), path.parent)
+    try:
+        content = reader(data if path.suffix.lower() == ".npz" else plain(data), path.parent)
+    except InputError:
+        raise
+    except UNREADABLE as error:
+        kind = path.suffix.lstrip(".").upper()
+        detail = " ".join(str(error).split())[:200] or type(error).__name__
+        raise InputError(f"is no {kind} file that can be read ({detail})") from error
+    _check_fits_together(content)
+    return content
+
+
+def _check_fits_together(content: Content) -> None:
+    """Check that normals, UVs and UVs of corners are numbers of the shapes that `Content` has."""
+    count = len(content.vertices)
+    uv_count = 0 if content.uv is None else content.uv.size // 2
+    for name, values, shape in (
+        ("normals", content.normals, (count, 3)),
+        ("UVs", content.uv, (uv_count, 2)),
+        ("UVs of corners", content.uv_corners, content.corners.shape),
+    ):
+        if values is not None and (values.shape != shape or values.dtype.kind not in "fiu"):
+            raise InputError(
+                f"has {name} of shape {values.shape} and type {values.dtype}, which do not fit its "
+                f"{count} vertices and {len(content.sizes)} faces"
+            )
 
 
 def _mesh(content: Content) -> tuple[Mesh, IntArray]:

@@ -89,7 +89,7 @@ NARROW = 32
 """Products with fewer columns are taken narrow side first."""
 ROOM = 16
 """Channels that a row of activations has beyond its own: the first is the homogeneous coordinate,
-and so many keep the rows aligned to 64 bytes."""
+and this number keeps the rows aligned to 64 bytes."""
 BLOCK = 4_608
 """Most rows, of points and tangents, that go through a stack together on a CPU: with 12,000 a step
 takes 7 % longer, as what a layer made has left the cache before the next one reads it."""

@@ -205,7 +205,7 @@ class _Group:
         ]
 
     def step(self, done: int, learning_rate: float) -> None:
-        """One step after so many that were done."""
+        """One step, after `done` others."""
         gradient = torch.stack(
             [
                 (torch.zeros_like(p) if p.grad is None else p.grad).reshape(_matrix_shape(p))

@@ -35,8 +35,8 @@ GATE_SHARE = 0.06
 GATE_POINTS = 384
 """Points of each of its steps."""
 SPARSE = 4
-"""One of so many points of the lattice goes through the networks: the surface is covered by the
-start, and Deform follows."""
+"""One point of the lattice in this many goes through the networks: the start covers the surface
+already, and Deform follows it."""
 
 
 class TaughtTrainer(Trainer):

@@ -31,10 +31,11 @@ DIVERGED = 10.0
 SHORT = 256
 """Points of a step where a time budget allows no more."""
 TIMED = range(3, 8)
-"""Steps of so many points that are timed; those before set up what later ones use."""
+"""Steps of SHORT points that are timed; the steps before them set up what later ones use."""
 DENSER = 4
-"""Under a time budget, which steps of all points would exceed, later ones hold a lattice of so many
-times the points of a step against the cloud. A coarse one draws both sides of a finger inwards."""
+"""Where steps of all points would exceed a time budget, later steps compare the cloud with a
+lattice of this many times the points of a step. A coarser one draws both sides of a finger
+inwards."""
 ENOUGH_STEPS = 5_000
 """A time budget that allows more steps of SHORT points than these gives larger ones in place."""
 SMALLER_STEP = 0.3

@@ -1,1 +1,1 @@
-"""Maps of planar domains: one to one, their energy brought down, their seams led on."""
+"""One-to-one maps of planar domains: their start, their descent, and the growth of their seams."""

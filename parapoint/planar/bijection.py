@@ -21,7 +21,8 @@ from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.surface import FloatArray, Mesh
 
 CLOSE = 5e-4
-"""Excess of energy that is none on the way to the layout, which is no goal of its own."""
+"""Excess of energy below which a map counts as having reached the layout. It is loose, since the
+layout is only a step on the way."""
 AT_LAYOUT = 0.1
 """Excess of energy at which a map has come to the layout, so that it needs no other way there."""
 MOST_ROUNDS = 10

@@ -9,7 +9,7 @@ from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 
 
 def crossing_vertices(disk: Mesh, uv: FloatArray) -> IntArray:
-    """Ends of the boundary edges that touch or cross others, but for neighbours at their vertex.
+    """The vertices of boundary edges that touch or cross others, other than the edges next to them.
 
     Without flips no point of the plane is covered more often than the boundary winds around it
     (its degree), so a map of a disk, with or without holes, is one to one if and only if the

@@ -106,9 +106,9 @@ def circle(points: FloatArray) -> FloatArray:
 
 
 def far_pair(points: FloatArray) -> tuple[int, int]:
-    """Two far points of (B, 3): the farthest from their mean, and the farthest from that.
+    """Rows of two far points of (B, 3): the farthest from the mean, and the farthest from that one.
 
-    Of several that are equally far but for rounding, the first.
+    Of several that are equally far up to rounding, the first.
     """
     one = _farthest(points, points.mean(axis=0))
     return one, _farthest(points, points[one])
@@ -120,7 +120,7 @@ def _farthest(points: FloatArray, origin: FloatArray) -> int:
 
 
 def finite(uv: FloatArray) -> FloatArray:
-    """`uv` (V, 2) as it is.
+    """`uv` (V, 2) unchanged, once it is known to be finite.
 
     Raises:
         FlatteningError: `uv` is not finite.

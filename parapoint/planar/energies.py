@@ -27,7 +27,7 @@ exp(density), which would overflow at a far start.
 
 
 def stepper(disk: Domain, uv: FloatArray, energy: str) -> Callable[[int], FloatArray]:
-    """A function that takes so many more of libigl's steps and gives the map (V, 2).
+    """A function that takes a number of libigl's steps and returns the map (V, 2) after them.
 
     The unit of the surface makes no difference: see `parapoint.planar.scaffold.LARGE`.
 

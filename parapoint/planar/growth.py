@@ -14,10 +14,10 @@ PRICE = 1.0
 """What the symmetric Dirichlet energy (4 at least) must fall by for each sqrt(area) of seam, unless
 told otherwise."""
 TRIALS, TRIALS_IN_NEED = 3, 6
-"""The seam is as long as it should be once branches to so many places in a row do not pay; more are
-tried where more seam is needed at any price."""
+"""The seam stops growing once branches to this many places in a row do not pay; the second number
+holds where more seam is needed at any price."""
 MOST_BRANCHES = 40
-"""The seam grows by so many branches at most."""
+"""The seam grows by at most this many branches."""
 LEAST_FALL = 0.01
 """Share of the energy's excess that a branch must take away where more seam is needed at any
 price."""

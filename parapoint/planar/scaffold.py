@@ -21,16 +21,16 @@ from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
 LEAST_GAIN = 0.02
 """A descent ends when a step lowers the energy's excess by less than this share of it."""
 EXACT = 1e-14
-"""Excess of energy that is none, in units of its least value."""
+"""An energy that is no farther above its least value than this, in units of it, is at its least."""
 MOST_STEPS = 50
 """Steps of a descent at most."""
 OPENING_STEPS = 100
-"""As MOST_STEPS, where a cut has to open first."""
+"""Steps of a descent at most where a new cut has to open first."""
 PATIENCE = 20
-"""Steps in which a cut may open before the energy falls by LEAST_GAIN."""
+"""Steps that a new cut may take to open before the energy must fall by LEAST_GAIN."""
 OPENING = 0.3
-"""How far the two sides of a new cut are moved apart, in the least height of the triangles there;
-at less than a half no triangle turns over."""
+"""How far each side of a new cut is moved, in the least height of the triangles there. Below a half
+no triangle turns over."""
 LARGE = 1e4
 """The side of the map on which libigl works: its line search takes a change of area of less than
 1e-10 for none, and would turn over the small faces of a map of side 1."""
@@ -73,7 +73,7 @@ def cut_opened(
     energy: igl.MappingEnergyType,
     deadline: float = math.inf,
 ) -> FloatArray:
-    """A map (V, 2) whose boundary touches itself along a new cut moved down an energy.
+    """Open a map (V, 2) along a new cut, where its boundary touches itself, and lower its energy.
 
     Args:
         mesh: the domain after the cut, of area 1.
@@ -93,9 +93,9 @@ def cut_opened(
 
 
 def moved_apart(mesh: Mesh, uv: FloatArray, is_copied: BoolArray) -> FloatArray:
-    """The map (V, 2) with the copies of a new cut's vertices moved into their own side each.
+    """The map (V, 2) with the two copies of each vertex of a new cut moved apart by OPENING.
 
-    They move along the line that halves the angle of the boundary there, by OPENING.
+    Each copy moves into its own side, along the line that halves the angle of the boundary there.
 
     Args:
         mesh: a planar domain, faces counter-clockwise.

@@ -16,8 +16,9 @@ COMPONENTS = ("together", "each", "largest")
 """What the parameter `components` of a fit may say: one map of the whole surface, one of each
 component, or one of the largest component alone."""
 NEIGHBOURS = 8
-"""Points joined to each point of a cloud. It needs no length, so uneven density is no matter; and
-more than so many points that are nearer to each other than to all others stand apart."""
+"""Each point of a cloud is joined to this many nearest points. No length is needed, so uneven
+density does no harm. More points than this that are nearer to each other than to all others are
+apart from these."""
 FEWEST = 100
 """Points of a component of a cloud; smaller ones go with the nearest that is larger."""
 SAMPLE = 200_000

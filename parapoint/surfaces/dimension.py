@@ -26,9 +26,9 @@ SAMPLE = 100_000
 LOOKED_AT = 300
 """Points around which they are counted."""
 SMALLEST, LARGEST, LARGEST_OF_SOLID = 8, 4096, 1024
-"""Neighbours at the first scale, and at the last one at most. Each scale reaches from so many to
-four times as many, and begins at twice those of the one before; a solid has too much of its rim in
-the largest."""
+"""Neighbours at the first scale, at the last one, and at the last one that is held against a solid,
+most of whose larger balls reach its rim. A scale compares the distance to a number of neighbours
+with that to four times as many; the next scale begins at twice the number."""
 CURVE = 1.3
 """Dimension that a curve is below at all scales; no model of the benchmark is."""
 SOLID = 2.45

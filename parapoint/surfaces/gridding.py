@@ -13,9 +13,9 @@ from parapoint.surfaces.surface import FloatArray, Mesh
 CELLS = 256
 """Cells of the grid along the longer side of the plane."""
 REACH = 4.5
-"""A corner of the grid is on the surface if an image of a known point is within so many times their
-spacing, the median distance to the nearest other one. Between random points the widest gaps reach
-to 3.5 of it."""
+"""A corner of the grid is on the surface if the image of a known point is within this many
+spacings. A spacing is the median distance from an image to the nearest other one; between random
+points the widest gaps reach to 3.5 spacings."""
 LONGEST = 8.0
 """Longest edge of a cell on the surface, in medians of all of them; a longer one tears it."""
 

@@ -15,12 +15,14 @@ FEWEST_POINTS = 100
 COINCIDENT = 1e-6
 """Points that agree to this, in radii of the surface, count as one."""
 FEWEST_VERTICES = 2_000
+"""A mesh of fewer vertices is coarse: these alone do not show its shape, so points of its faces are
+added."""
 NEAREST = 3
+"""Nearest vertices of each one that are looked at on a mesh of more vertices."""
 FAR = 0.005
-"""A mesh is coarse if it has fewer vertices, or if of the nearest so many of each one more than
-this share are more than two edges off: its vertices alone do not show where parts of it are apart,
-so points of its faces are added. Of 43 models with more vertices the share is at most 0.24 % on 28,
-and 0.8 to 27 % on 15."""
+"""Such a mesh is coarse as well if more than this share of the nearest vertices are more than two
+edges away: then its vertices alone do not show where parts of it are apart. Of 43 models the share
+is at most 0.24 % on 28, and 0.8 to 27 % on 15."""
 CANDIDATES = 6
 """Points from which each one on a face is chosen."""
 PACKED = 0.66

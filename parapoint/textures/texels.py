@@ -14,10 +14,10 @@ from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray
 
 RIM = 1.4
-"""Texels around a chart that continue the triangle beside them: bilinear sampling at the chart's
-edge reads texels up to so far outside of it."""
+"""Width, in texels, of the rim around a chart in which texels continue the triangle beside them:
+bilinear sampling at the edge of the chart reads texels as far outside as this."""
 EXTENDED = 1.5
-"""How far from its middle a triangle is continued at most, in its barycentric coordinates."""
+"""How far from its middle a triangle is continued at most, in barycentric coordinates."""
 FLAT = 1e-9
 """Doubled area, in texels, below which a triangle counts as without area."""
 CANDIDATES = 2_000_000

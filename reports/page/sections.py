@@ -16,7 +16,7 @@ from PIL import Image
 
 from benchmarks.cases.suites import SUITES
 from benchmarks.running import planning
-from benchmarks.store.rows import ResultRow
+from benchmarks.store.rows import SUBMITTED, ResultRow
 from parapoint.errors import InputError
 from parapoint.surfaces.surface import Mesh
 from reports.contents import AREA, FLIPPED, SHEETS, Contents, Label, number, suite_title
@@ -25,7 +25,7 @@ from reports.pictures.figures import Drawn
 from reports.pictures.names import VIEWED, map_file, model_file, slug
 from reports.tables import leaderboard
 from reports.tables.leaderboard import MEASURES, SHOWN, Glance, Winner, definition, page_of, winner
-from reports.tables.notes import load_notes
+from reports.tables.notes import load_notes, version_notes
 from reports.tables.published import published_values
 from reports.tables.table import Table, metric_column
 
@@ -142,9 +142,9 @@ class Section:
         return dict(Counter(row.status.replace("_", " ") for row in self.contents.rows))
 
     @property
-    def load_notes(self) -> list[str]:
-        """Which times are unsure, as the machine was busy."""
-        return load_notes(self.contents)
+    def warnings(self) -> list[str]:
+        """What a reader must know: mixed versions, and times that a busy machine made unsure."""
+        return [*version_notes(self.contents), *load_notes(self.contents)]
 
     @property
     def unfinished(self) -> list[ResultRow]:
@@ -340,8 +340,9 @@ class Section:
         seeds = ",".join(str(seed) for seed in sorted({row.seed for row in self.contents.rows}))
         cases = ",".join(self.contents.cases)
         named = [self.name] if self.name in SUITES else []
-        if _methods_of(self.name) != {(one.method, one.params) for one in self.contents.methods}:
-            named += ["--methods", ",".join(map(_spec, self.contents.methods))]
+        ours = [label for label in self.contents.methods if label.method != SUBMITTED]
+        if _methods_of(self.name) != {(label.method, label.params) for label in ours}:
+            named += ["--methods", ",".join(map(_spec, ours))]
         run = ["python", "-m", "benchmarks", "run", *named]
         return shlex.join([*run, "--cases", cases, "--seeds", seeds, "--out", str(self.results)])
 

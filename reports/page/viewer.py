@@ -69,7 +69,7 @@ def sevens(content: bytes) -> str:
 
 
 _ESCAPED = str.maketrans({"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r"})
-"""The letters that may not stand in such a string as they are."""
+"""The letters that have to be escaped in such a string."""
 
 
 def steps(values: IntArray) -> npt.NDArray[Any]:
@@ -103,12 +103,13 @@ def growth(corners: IntArray) -> tuple[IntArray, IntArray]:
 def surprises(
     places: IntArray, corners: IntArray, bits: int, space: IntArray | None = None
 ) -> npt.NDArray[Any]:
-    """By how much the places (n, k), of so many bits, are not what `growth` predicts.
+    """The differences of the places (n, k), of `bits` bits, from what `growth` predicts.
 
-    That is the fourth corner of a parallelogram or, for rows that lie at `space` (n, 3), where the
-    affine map of the known face takes the new one, `unfolded`.
+    It predicts the fourth corner of a parallelogram or, for rows that lie at `space` (n, 3), the
+    place to which the affine map of the known face takes the new corner, `unfolded`.
 
-    (m, k) for the rows that `corners` has, as they first appear, in `zigzag`.
+    Returns (m, k) differences in `zigzag`, for the rows of `corners` in the order in which they
+    first appear.
     """
     row, known = growth(corners)
     shares = [1.0, 1.0, -1.0] if space is None else unfolded(_padded(space), row, *known)

@@ -211,7 +211,8 @@ class Portrait:
     def _field(self, found: PointMap) -> float:
         """The side of a field of the checkerboard in uv.
 
-        As on a mesh by the median scale of the map, but of so many points that it can be seen.
+        It follows the median scale of the map, as on a mesh, but a field holds enough points that
+        it can be seen.
         """
         magnified = float(np.median(found.singular_values.prod(axis=1)[~found.spanning]))
         near = np.linalg.norm(found.points[found.neighbours[:, 0]] - found.points, axis=1)

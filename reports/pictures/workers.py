@@ -37,7 +37,7 @@ def done_by_several(
 
 
 def _pool(jobs: int) -> ProcessPoolExecutor | None:
-    """Processes for so many jobs; None for one, or if there can be none."""
+    """Processes for `jobs` jobs; None for one job, or where there can be no others."""
     if jobs <= 1:
         return None
     try:

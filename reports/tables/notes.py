@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from benchmarks.store import versions
 from reports.contents import Contents
 from reports.ranking import COLLAPSED_FLAG
 
@@ -47,6 +48,14 @@ def load_notes(contents: Contents) -> list[str]:
             "less touched."
         )
     return notes
+
+
+def version_notes(contents: Contents) -> list[str]:
+    """Whether the rows belong to several versions of the suite, and how many to each."""
+    counts = versions.versions(contents.store, contents.rows).get(contents.suite, {})
+    if len(counts) < 2:
+        return []
+    return [f"Several versions of the suite are mixed here: {versions.said(counts)}."]
 
 
 def grade_notes(contents: Contents) -> list[str]:

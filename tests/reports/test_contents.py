@@ -1,7 +1,10 @@
+import dataclasses
+
 import pytest
 
 from parapoint.errors import InputError
 from reports.contents import contents, labels, suite_title
+from reports.tables.notes import version_notes
 
 from .conftest import HAND, Writer, flat, sheet
 
@@ -129,3 +132,26 @@ def test_missing_and_empty_folders_are_said_in_one_line(tmp_path):
 def test_titles_of_suites():
     assert suite_title("paper").startswith("The supplement's comparison")
     assert suite_title("my own") == "my own"
+
+
+def test_a_submission_is_called_as_its_author_calls_it(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for name in ("My tool", "My tool 2", "<b>"):
+            writer.cell("a", sheet(), "submitted", {"name": name}, result=flat(sheet()))
+    (suite,) = contents(tmp_path)
+    assert [(one.name, one.detail, one.short) for one in suite.methods] == [
+        (name, "submitted maps", name) for name in ("My tool", "My tool 2", "<b>")
+    ]
+
+
+def test_mixed_versions_of_a_suite_are_said(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for number, case in enumerate(("a", "b")):
+            writer.store.add_run({"suite_version": number, "suite_hash": f"hash{number}"})
+            writer.cell(case, sheet(), "slim", {}, result=flat(sheet()), run=number)
+    (suite,) = contents(tmp_path)
+    (note,) = version_notes(suite)
+    assert "1 of version 0 (hash0), 1 of version 1 (hash1)" in note
+    assert not version_notes(dataclasses.replace(suite, rows=suite.rows[:1]))

@@ -222,7 +222,6 @@ def test_the_heatmap_is_refused_before_any_work(obj, tmp_path, capsys, monkeypat
 
 def test_wrong_use_gets_one_line(obj, tmp_path, capsys):
     assert "--colour" in fault(capsys, obj, "--colour")
-    assert "FILE" in fault(capsys)
     assert "ends in .png" in fault(capsys, obj, "--heatmap", tmp_path / "x.jpg")
     cloud = tmp_path / "cloud.npz"
     cloud.write_bytes(b"PK no zip")

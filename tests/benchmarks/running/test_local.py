@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from benchmarks.cases.suites import Suite
-from benchmarks.running import executors, local, runner, scratch
+from benchmarks.running import executors, local, runner, scoring, scratch
 from benchmarks.running.local import Local
 from benchmarks.running.tasks import MeasureJob, Outcome, Ready, Task, to_json
 from benchmarks.store.results import Store
@@ -286,5 +286,5 @@ def test_a_supervisor_that_never_starts_ends_the_run_in_one_line(hands):
 
 def test_the_memory_of_the_machine_is_shared_by_the_jobs(monkeypatch):
     monkeypatch.setattr(runner.environment, "memory", lambda: 1000)
-    assert runner._memory_limit(None, 4) == 200
-    assert runner._memory_limit(2.5, 4) == 2.5e9
+    assert scoring.memory_limit(None, 4) == 200
+    assert scoring.memory_limit(2.5, 4) == 2.5e9

@@ -22,7 +22,7 @@ from benchmarks.cases import models
 from benchmarks.cases.suites import Suite
 from benchmarks.checks import endurance
 from benchmarks.metrics.evaluation import evaluate_points
-from benchmarks.running import cell, environment, executors, planning, runner, scratch
+from benchmarks.running import cell, environment, executors, planning, runner, scoring, scratch
 from benchmarks.running.runner import Summary, run
 from benchmarks.store import measuring, verifying
 from benchmarks.store.results import Store
@@ -587,7 +587,7 @@ def test_a_wild_map_has_no_metrics_but_its_run_ends(tmp_path, monkeypatch):
         return Parameterization(uv * 1e300, surface.faces)
         """
     plugins = write_plugin(tmp_path / "plugin.py", {"wild": body})
-    monkeypatch.setattr(runner, "METRICS_TIME_LIMIT", 0.01)
+    monkeypatch.setattr(scoring, "METRICS_TIME_LIMIT", 0.01)
     summary = run(suite(), tmp_path / "out", plugins=plugins, methods=["wild"])
     (row,) = summary.ran
     assert row.status == "ok"

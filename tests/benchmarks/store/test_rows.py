@@ -177,6 +177,6 @@ def test_a_row_is_appended_inside_writing_alone(tmp_path):
     store = Store(tmp_path)
     with store.writing():
         add(store, status="failed")
-    with pytest.raises(RuntimeError, match="inside writing"):
+    with pytest.raises(RuntimeError, match="inside appending"):
         add(store, status="failed", seed=1)
     assert len(store.rows()) == 1

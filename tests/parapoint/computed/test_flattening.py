@@ -2,13 +2,9 @@ import numpy as np
 import pytest
 
 from benchmarks.cases.builtin import sphere, torus
-from parapoint.computed import flattening
 from parapoint.computed.flattening import (
     FlatMap,
     _chosen_copies,
-    _joined_loops,
-    _scale_cuts,
-    _seamed,
     _vertex_jacobians,
     flat_map,
 )
@@ -140,49 +136,6 @@ def grid(side: int) -> Mesh:
     return Mesh(np.stack([x, y, 0 * x], axis=1), faces)
 
 
-def plate_with_pins(side: int, pins: list[tuple[int, int]]) -> Mesh:
-    """A square of side² vertices, with a tube of six sides and rows on each vertex given."""
-    plate, faces, count = grid(side).vertices.copy(), grid(side).faces, side**2
-    points = [plate]
-    for middle, rows in pins:
-        faces = faces[(faces != middle).all(axis=1)]
-        below = middle + np.array([-side - 1, -side, 1, side + 1, side, -1])
-        foot = plate[below]
-        for height in range(1, rows + 1):
-            above, count = count + np.arange(6), count + 6
-            points.append(foot + np.array([0, 0, height]))
-            to, up = np.roll(below, -1), np.roll(above, -1)
-            walls = np.stack([below, to, up], axis=1), np.stack([below, up, above], axis=1)
-            faces, below = np.concatenate([faces, *walls]), above
-        plate[middle, 2] = rows
-        tip = np.stack([below, np.roll(below, -1), np.full(6, middle)], axis=1)
-        faces = np.concatenate([faces, tip])
-    return Mesh(np.concatenate(points), faces)
-
-
-def test_of_two_pins_that_is_cut_whose_cut_gains_more_for_each_edge() -> None:
-    # A pin's area goes by its rows: 24 and 14. A cut to its tip takes these, two edges over the tip
-    # and its foot, and the way from the rim: 24 + 10 = 34 and 14 + 2 = 16. So the high pin gains
-    # 24 / 34 an edge and the low one more, 14 / 16, though all in all less. There the cut goes
-    # first, and it makes the scale even enough.
-    mesh = plate_with_pins(21, [(10 * 21 + 10, 24), (10 * 21 + 3, 14)])
-    cut = _scale_cuts(mesh, 34)
-    copied = cut.vertices[len(mesh.vertices) :]
-    assert len(copied) == 16
-    assert (copied[:, 0] <= 4).all()
-
-
-def test_a_tip_is_far_from_the_boundary_and_in_its_scale_from_the_mean(monkeypatch) -> None:
-    # The log scale falls by the row of a pin: the one near the rim, of 22 rows, is the more extreme
-    # of the two, but its tip is 24 edges from the boundary, that of the other, of 20 rows, 30.
-    # 20 · 30 is more than 22 · 24, so the one tip that is tried is in the middle.
-    monkeypatch.setattr(flattening, "TIPS", 1)
-    mesh = plate_with_pins(21, [(220, 20), (213, 22)])
-    copied = _scale_cuts(mesh, 30).vertices[len(mesh.vertices) :]
-    assert len(copied) == 30
-    assert np.abs(copied[copied[:, 2] > 0, :2] - 10).max() <= 1
-
-
 def edges_across(mesh: Mesh, path: list[int]) -> np.ndarray:
     """(n, 2) the edges between points on different sides, where the mesh is slit along a path."""
     disk = cut_along(mesh, np.stack([path[:-1], path[1:]], axis=1))
@@ -209,43 +162,6 @@ def test_no_point_has_most_of_its_edges_across_the_seam() -> None:
     across = edges_across(mesh, [4, 14, 24, 33, 34, 25, 16])
     share = np.bincount(across.ravel(), minlength=81) / np.bincount(mesh.edges.ravel())
     assert 0 < share.max() <= 0.5
-
-
-def test_a_flat_ring_stays_a_ring_though_its_hole_has_the_longer_boundary() -> None:
-    # Its outer loop turns by 2π, the star in its middle by −2π: so they are, and nothing is joined.
-    turn = 2 * np.pi * np.arange(24) / 24
-    rows = [np.where(np.arange(24) % 2, 1.9, 1.0), np.full(24, 2.2), np.full(24, 2.5)]
-    ring = np.concatenate([np.stack([r * np.cos(turn), r * np.sin(turn)], axis=1) for r in rows])
-    a = np.arange(48)
-    b = a - a % 24 + (a + 1) % 24
-    faces = np.concatenate(
-        [np.stack([a, b + 24, b], axis=1), np.stack([a, a + 24, b + 24], axis=1)]
-    )
-    mesh = Mesh(np.pad(ring, ((0, 0), (0, 1))), faces)
-    assert mesh.boundary_loops[0].max() < 24  # the star
-    assert _joined_loops(mesh) is mesh
-
-
-def test_cuts_are_at_most_2_2_percent_of_the_faces_of_an_open_surface() -> None:
-    # Cuts to all three pins would pay, and take 40 edges. But the plate has 800 faces and the pins
-    # 12 (16 + 14 + 14), so 29 are cut at most.
-    mesh = plate_with_pins(21, [(220, 16), (213, 14), (227, 14)])
-    assert len(mesh.faces) == 1328
-    assert 16 <= len(_seamed(mesh).vertices) - len(mesh.vertices) <= 29
-
-
-def test_cuts_are_at_most_3_7_percent_of_the_faces_of_a_closed_surface() -> None:
-    # The same plate, closed by 80 triangles to a point below, has 1,408 faces, so 52 edges are cut
-    # at most, those that open it to a disk among them. Cuts to all pins would take 74.
-    plate = plate_with_pins(21, [(220, 16), (213, 14), (227, 14)])
-    (rim,) = plate.boundary_loops
-    below = len(plate.vertices)
-    fan = np.stack([np.roll(rim, -1), rim, np.full(len(rim), below)], axis=1)
-    points = np.concatenate([plate.vertices, [[10.0, 10, -5]]])
-    mesh = Mesh(points, np.concatenate([plate.faces, fan]))
-    assert mesh.topology == "sphere"
-    assert len(mesh.faces) == 1408
-    assert 32 <= len(_seamed(mesh).vertices) - len(mesh.vertices) <= 52
 
 
 def test_a_vertex_s_derivative_is_the_mean_of_its_faces_by_area() -> None:

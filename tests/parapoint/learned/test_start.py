@@ -32,7 +32,9 @@ def slit(side: int = 41) -> Flattened:
     disk = cut_along(mesh, np.stack([path[:-1], path[1:]], axis=1))
     origin = np.empty(len(disk.vertices), dtype=np.int64)
     origin[disk.faces] = mesh.faces
-    return Flattened(np.arange(side * side), mesh, disk, origin, disk.vertices[:, :2], False)
+    return Flattened(
+        np.arange(side * side), np.arange(0), mesh, disk, origin, disk.vertices[:, :2], False
+    )
 
 
 def test_a_slit_has_two_banks_that_meet_at_its_tip() -> None:
@@ -67,7 +69,7 @@ def test_a_gate_jumps_across_the_slit_and_nowhere_else() -> None:
 def test_a_surface_without_a_cut_has_no_seam() -> None:
     mesh = sheet(5)
     rows = np.arange(25)
-    assert seams(Flattened(rows, mesh, mesh, rows, mesh.vertices[:, :2], False)) == []
+    assert seams(Flattened(rows, rows[:0], mesh, mesh, rows, mesh.vertices[:, :2], False)) == []
 
 
 @pytest.mark.parametrize(

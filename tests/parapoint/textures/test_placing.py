@@ -28,6 +28,14 @@ def test_distances_keep_their_ratio_and_the_side_its_hand() -> None:
     assert np.linalg.det(placing.turn) == pytest.approx(1)
 
 
+def test_a_map_lies_in_the_middle_of_the_square() -> None:
+    """A rectangle of 10 by 7 fills the square along one side; the rest is free on both sides."""
+    rectangle = np.array([[0.0, 0], [10, 0], [10, 7], [0, 7]])
+    placed = Placing.smallest(rectangle, border=0.1)(rectangle)
+    assert_allclose(placed.min(axis=0), [0.1, 0.22])
+    assert_allclose(placed.max(axis=0), [0.9, 0.78])
+
+
 def test_points_on_a_line_find_a_place() -> None:
     line = np.column_stack([np.arange(5.0), np.zeros(5)])
     placed = Placing.smallest(line)(line)

@@ -1,0 +1,87 @@
+"""The metrics of stored maps, each computed in a process of its own: a wild map may kill it."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from benchmarks.running import environment, scratch
+from benchmarks.running.local import Local
+from benchmarks.running.tasks import Executor, MeasureJob, Outcome, Task
+from benchmarks.store.results import Store
+from benchmarks.store.rows import ResultRow
+
+METRICS_TIME_LIMIT = 120.0
+"""Wall time in seconds that the metrics of one map may take; 100,000 faces take a few seconds."""
+MEMORY_SHARE = 0.8
+"""Fraction of the machine's memory that all cells together may hold, if the user sets no limit."""
+MAPS_PER_WORKER = 4
+"""Maps to measure that justify another supervisor, which takes a second to start."""
+Told = Callable[[int, int], None]
+"""Hears how many of how many maps have been measured."""
+
+
+def memory_limit(memory: float | None, jobs: int) -> float:
+    """Bytes that a job may hold: `memory` in GB, or its part of the machine's memory."""
+    return memory * 1e9 if memory else MEMORY_SHARE * environment.memory() / jobs
+
+
+def reference(store: Store, row: ResultRow) -> Path | None:
+    """The file of the map that the row's model came with; None if it came with none."""
+    path = store.reference_path(row.surface_hash)
+    return path if path.exists() else None
+
+
+def scores(
+    store: Store, rows: Sequence[ResultRow], workers: Executor, memory: float | None, told: Told
+) -> tuple[dict[str, dict[str, float]], dict[str, str]]:
+    """Every metric of the maps of `rows`, computed anew; and why there are none.
+
+    Args:
+        store: where the surfaces and the maps are.
+        rows: rows with a map.
+        workers: do the work.
+        memory: GB that the metrics of a map may take; None for a part of the machine's.
+        told: hears of each map.
+
+    Returns:
+        By row id, the metrics by name, none where they could not be computed; and the reasons.
+    """
+    values: dict[str, dict[str, float]] = {}
+    reasons: dict[str, str] = {}
+    jobs = min(workers.width, 1 + len(rows) // MAPS_PER_WORKER)
+
+    def began() -> None:
+        told(len(values), len(rows))
+
+    def ended(row: ResultRow, outcome: Outcome, _: Path) -> None:
+        values[row.id] = dict(outcome.metrics)
+        if outcome.status != "ok":
+            reasons[row.id] = outcome.reason
+        told(len(values), len(rows))
+
+    tasks = [
+        Task(
+            MeasureJob(
+                surface=store.scored_path(row.surface_hash),
+                reference=reference(store, row),
+                uv=store.uv_path(row.id),
+                time_limit=METRICS_TIME_LIMIT,
+                memory_limit=memory_limit(memory, jobs),
+            ),
+            began,
+            functools.partial(ended, row),
+        )
+        for row in rows
+    ]
+    workers.run(tasks, jobs)
+    return values, reasons
+
+
+def scored_here(
+    store: Store, rows: Sequence[ResultRow], told: Told
+) -> tuple[dict[str, dict[str, float]], dict[str, str]]:
+    """As `scores`, on all processors of this machine; scratch files lie in the store's folder."""
+    with Local(store.folder / scratch.NAME, 1, lambda: None) as workers:
+        return scores(store, rows, workers, None, told)

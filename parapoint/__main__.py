@@ -1,0 +1,5 @@
+"""`python -m parapoint`: the command `parapoint`."""
+
+from parapoint.cli import main
+
+main()

@@ -1,0 +1,137 @@
+"""Where a cloud is cut open: to an even scale, and to what would be starved."""
+
+from unittest.mock import Mock
+
+import numpy as np
+
+from benchmarks.cases import builtin
+from parapoint.computed import seams
+from parapoint.computed.layout import scaled_layout
+from parapoint.computed.scale import even_scale
+from parapoint.computed.seams import evened, fed, joined_loops, seamed
+from parapoint.planar.bijection import bijective_map
+from parapoint.surfaces.areas import signed_areas
+from parapoint.surfaces.surface import Mesh
+
+
+def grid(side: int) -> Mesh:
+    """A square of side² vertices; vertex side · y + x, diagonals up to the right."""
+    x, y = (of.ravel() for of in np.meshgrid(np.arange(side), np.arange(side)))
+    corner = (side * np.arange(side - 1)[:, None] + np.arange(side - 1)).ravel()
+    sides = [0, 1, side + 1], [0, side + 1, side]
+    faces = np.concatenate([corner[:, None] + np.array(of) for of in sides])
+    return Mesh(np.stack([x, y, 0 * x], axis=1), faces)
+
+
+def plate_with_pins(side: int, pins: list[tuple[int, int]]) -> Mesh:
+    """A square of side² vertices, with a tube of six sides and rows on each vertex given."""
+    plate, faces, count = grid(side).vertices.copy(), grid(side).faces, side**2
+    points = [plate]
+    for middle, rows in pins:
+        faces = faces[(faces != middle).all(axis=1)]
+        below = middle + np.array([-side - 1, -side, 1, side + 1, side, -1])
+        foot = plate[below]
+        for height in range(1, rows + 1):
+            above, count = count + np.arange(6), count + 6
+            points.append(foot + np.array([0, 0, height]))
+            to, up = np.roll(below, -1), np.roll(above, -1)
+            walls = np.stack([below, to, up], axis=1), np.stack([below, up, above], axis=1)
+            faces, below = np.concatenate([faces, *walls]), above
+        plate[middle, 2] = rows
+        tip = np.stack([below, np.roll(below, -1), np.full(6, middle)], axis=1)
+        faces = np.concatenate([faces, tip])
+    return Mesh(np.concatenate(points), faces)
+
+
+def test_of_two_pins_that_is_cut_whose_cut_gains_more_for_each_edge() -> None:
+    # A pin's area goes by its rows: 24 and 14. A cut to its tip takes these, two edges over the tip
+    # and its foot, and the way from the rim: 24 + 10 = 34 and 14 + 2 = 16. So the high pin gains
+    # 24 / 34 an edge and the low one more, 14 / 16, though all in all less. There the cut goes
+    # first, and it makes the scale even enough.
+    mesh = plate_with_pins(21, [(10 * 21 + 10, 24), (10 * 21 + 3, 14)])
+    cut = evened(mesh, 34)
+    copied = cut.vertices[len(mesh.vertices) :]
+    assert len(copied) == 16
+    assert (copied[:, 0] <= 4).all()
+
+
+def test_a_tip_is_far_from_the_boundary_and_in_its_scale_from_the_mean(monkeypatch) -> None:
+    # The log scale falls by the row of a pin: the one near the rim, of 22 rows, is the more extreme
+    # of the two, but its tip is 24 edges from the boundary, that of the other, of 20 rows, 30.
+    # 20 · 30 is more than 22 · 24, so the one tip that is tried is in the middle.
+    monkeypatch.setattr(seams, "TIPS", 1)
+    mesh = plate_with_pins(21, [(220, 20), (213, 22)])
+    copied = evened(mesh, 30).vertices[len(mesh.vertices) :]
+    assert len(copied) == 30
+    assert np.abs(copied[copied[:, 2] > 0, :2] - 10).max() <= 1
+
+
+def test_a_flat_ring_stays_a_ring_though_its_hole_has_the_longer_boundary() -> None:
+    # Its outer loop turns by 2π, the star in its middle by −2π: so they are, and nothing is joined.
+    turn = 2 * np.pi * np.arange(24) / 24
+    rows = [np.where(np.arange(24) % 2, 1.9, 1.0), np.full(24, 2.2), np.full(24, 2.5)]
+    ring = np.concatenate([np.stack([r * np.cos(turn), r * np.sin(turn)], axis=1) for r in rows])
+    a = np.arange(48)
+    b = a - a % 24 + (a + 1) % 24
+    faces = np.concatenate(
+        [np.stack([a, b + 24, b], axis=1), np.stack([a, a + 24, b + 24], axis=1)]
+    )
+    mesh = Mesh(np.pad(ring, ((0, 0), (0, 1))), faces)
+    assert mesh.boundary_loops[0].max() < 24  # the star
+    assert joined_loops(mesh) is mesh
+
+
+def test_cuts_are_at_most_2_2_percent_of_the_faces_of_an_open_surface() -> None:
+    # Cuts to all three pins would pay, and take 40 edges. But the plate has 800 faces and the pins
+    # 12 (16 + 14 + 14), so 29 are cut at most.
+    mesh = plate_with_pins(21, [(220, 16), (213, 14), (227, 14)])
+    assert len(mesh.faces) == 1328
+    assert 16 <= len(seamed(mesh).vertices) - len(mesh.vertices) <= 29
+
+
+def test_cuts_are_at_most_3_7_percent_of_the_faces_of_a_closed_surface() -> None:
+    # The same plate, closed by 80 triangles to a point below, has 1,408 faces, so 52 edges are cut
+    # at most, those that open it to a disk among them. Cuts to all pins would take 74.
+    plate = plate_with_pins(21, [(220, 16), (213, 14), (227, 14)])
+    (rim,) = plate.boundary_loops
+    below = len(plate.vertices)
+    fan = np.stack([np.roll(rim, -1), rim, np.full(len(rim), below)], axis=1)
+    points = np.concatenate([plate.vertices, [[10.0, 10, -5]]])
+    mesh = Mesh(points, np.concatenate([plate.faces, fan]))
+    assert mesh.topology == "sphere"
+    assert len(mesh.faces) == 1408
+    assert 32 <= len(seamed(mesh).vertices) - len(mesh.vertices) <= 52
+
+
+def test_a_short_pin_is_cut_only_where_every_part_is_to_keep_its_area() -> None:
+    # The pin has 54 of 450 units of area, so the scale is even enough though it shrinks by e² for
+    # each of its 8 rows. A cut from the rim to its tip takes 9 edges to the foot and 9 up the pin.
+    mesh = plate_with_pins(21, [(220, 8)])
+    assert len(seamed(mesh, "conformal").vertices) == len(mesh.vertices)
+    for distortion in ("balanced", "isometric"):
+        copied = seamed(mesh, distortion).vertices[len(mesh.vertices) :]
+        assert len(copied) == 18
+        assert copied[:, 2].max() == 8
+        assert (np.abs(copied[:, :2] - 10).max(axis=1) == 10).any()
+
+
+def test_each_starved_part_is_fed() -> None:
+    mesh = plate_with_pins(31, [(480 - 8, 8), (480 + 8, 8), (480 - 8 * 31, 8)])
+    copied = fed(mesh).vertices[len(mesh.vertices) :]
+    tops = copied[copied[:, 2] == 8, :2]
+    for middle in ([7, 15], [23, 15], [15, 7]):
+        assert (np.abs(tops - middle).max(axis=1) <= 1).any()
+
+
+def test_what_no_cut_helps_is_given_up(monkeypatch) -> None:
+    mesh = plate_with_pins(21, [(220, 8)])
+    monkeypatch.setattr(seams, "_mean_lack", Mock(return_value=1.0))
+    assert fed(mesh) is mesh
+
+
+def test_the_predicted_shares_are_those_of_the_map() -> None:
+    mesh = seamed(builtin.finger(), "balanced")
+    uv = bijective_map(mesh, scaled_layout(mesh, even_scale(mesh)))
+    area = signed_areas(uv, mesh.faces)
+    share = area / area.sum() * mesh.face_areas.sum() / mesh.face_areas
+    assert np.median(np.abs(np.log(share / seams._predicted_ratios(mesh)))) < 0.1

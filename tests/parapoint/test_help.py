@@ -1,0 +1,109 @@
+"""Help comes at once, says what it should, and completes names in a shell."""
+
+import subprocess
+import sys
+
+import click
+import pytest
+from rich.console import Console
+
+from benchmarks import __main__ as benchmarks
+from benchmarks.commands import listing
+from parapoint import __version__, cli, console
+from reports import __main__ as reports
+
+GROUPS = {"parapoint": cli.parapoint, "python -m benchmarks": benchmarks.main}
+
+
+NEEDS_NOTHING = {"run", "speed", "bake"}
+"""Commands that do their work when nothing is said."""
+
+
+def ended(program, arguments, capsys):
+    """Exit status, output and errors of a command."""
+    with pytest.raises(SystemExit) as caught:
+        console.run(program, arguments)
+    return caught.value.code, *capsys.readouterr()
+
+
+def resolved(group, name):
+    with click.Context(group) as context:
+        return group.resolve_command(context, [name])[1]
+
+
+@pytest.mark.parametrize("group", GROUPS.values(), ids=GROUPS)
+def test_a_summary_in_the_help_is_the_first_sentence_of_the_command(group):
+    for name, placeholder in group.commands.items():
+        command = resolved(group, name)
+        assert command.get_short_help_str(200) == placeholder.get_short_help_str(200), name
+
+
+@pytest.mark.parametrize(
+    ("program", "arguments"),
+    [
+        (cli.parapoint, []),
+        *((cli.parapoint, [name]) for name in cli.parapoint.commands),
+        (benchmarks.main, []),
+        *((benchmarks.main, [n]) for n in benchmarks.main.commands if n not in NEEDS_NOTHING),
+        (reports.main, []),
+    ],
+)
+def test_a_bare_command_prints_its_whole_help(program, arguments, capsys):
+    status, out, err = ended(program, arguments, capsys)
+    assert (status, out) == (2, "")
+    assert err.startswith("Usage: ")
+    assert "--help" in err
+    assert all(len(line) <= 80 for line in err.splitlines())
+
+
+@pytest.mark.parametrize("program", [cli.parapoint, benchmarks.main, reports.main])
+def test_the_version_is_told(program, capsys):
+    status, out, _ = ended(program, ["--version"], capsys)
+    assert status == 0
+    assert __version__ in out
+
+
+def test_wrong_usage_names_the_help_that_would_help(capsys):
+    status, out, err = ended(cli.parapoint, ["fit", "cloud.ply", "--oot", "x"], capsys)
+    assert (status, out) == (2, "")
+    assert err.count("\n") == 1
+    assert "--oot" in err
+    assert "fit --help)" in err
+
+
+@pytest.mark.parametrize("module", ["parapoint.cli", "parapoint.__main__"])
+def test_help_imports_nothing_heavy(module):
+    code = (
+        f"import sys; sys.argv = ['parapoint', '--help']\n"
+        f"try:\n    import {module} as m; m.main()\n"
+        "except SystemExit: pass\n"
+        "print('loaded', {'torch', 'scipy', 'igl', 'numpy', 'rich'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "unwrap" in done.stdout
+    assert done.stdout.endswith("loaded set()\n")
+
+
+def test_a_shell_completes_commands_and_options():
+    def completed(words):
+        from click.shell_completion import BashComplete
+
+        complete = BashComplete(cli.parapoint, {}, "parapoint", "_PARAPOINT_COMPLETE")
+        return {item.value for item in complete.get_completions(words[:-1], words[-1])}
+
+    assert completed(["un"]) == {"unwrap"}
+    assert "--distortion" in completed(["fit", "--dis"])
+
+
+@pytest.mark.parametrize("what", listing.LISTS)
+@pytest.mark.parametrize("width", [60, 80])
+def test_a_list_fits_a_terminal_and_keeps_every_word(what, width):
+    table = listing.LISTS[what]()
+    shown = Console(force_terminal=True, color_system=None, width=width)
+    with shown.capture() as capture:
+        shown.print(listing.entries(table))
+    lines = capture.get().splitlines()
+    assert all(len(line) <= width for line in lines)
+    text = "".join("".join(lines).split())
+    for column in table.columns:
+        assert all("".join(str(cell).split()) in text for cell in column.cells)

@@ -1,0 +1,76 @@
+"""The picture of a textured mesh, part by part, with known answers."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from parapoint import Mesh, Parameterization
+from parapoint.surfaces.parameterization import Charted
+from parapoint.textures import preview as room
+
+RED, GREEN, BLUE, GREY = [255, 0, 0], [0, 255, 0], [0, 0, 255], [90, 90, 90]
+TEXTURE = np.array([[RED, GREEN], [BLUE, GREY]], dtype=np.uint8)
+"""Red at the top left, grey at the bottom right."""
+UV = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+SQUARE = Charted(
+    Mesh(np.column_stack([UV, np.zeros(4)]), [[0, 1, 2], [0, 2, 3]]),
+    Parameterization(UV, [[0, 1, 2], [0, 2, 3]]),
+)
+
+
+@pytest.fixture(autouse=True)
+def small(monkeypatch):
+    monkeypatch.setattr(room, "SIDE", 64)
+    monkeypatch.setattr(room, "SAMPLES", 40_000)
+
+
+def test_v_runs_upwards_in_a_texture() -> None:
+    uv = np.array([[0.25, 0.75], [0.75, 0.75], [0.25, 0.25], [0.75, 0.25], [1.0, 1.0], [0.0, 0.0]])
+    wanted = [RED, GREEN, BLUE, GREY, GREEN, BLUE]
+    assert_array_equal(room._looked_up(TEXTURE, uv), wanted)
+
+
+def test_a_layout_that_fills_the_square_is_its_texture() -> None:
+    layout = room._layout(SQUARE, TEXTURE)
+    assert_array_equal(layout, np.repeat(np.repeat(TEXTURE, 32, axis=0), 32, axis=1))
+
+
+def test_points_are_spread_evenly_over_and_within_the_faces() -> None:
+    """A corner's half of a triangle, seen from that corner, holds a quarter of its points."""
+    mesh = Mesh([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 3, 0]], [[0, 1, 2], [1, 3, 2]])
+    face, weights = room._evenly_spread(mesh)
+    assert_allclose(np.bincount(face) / len(face), [1 / 3, 2 / 3], atol=1e-4)
+    for of in range(2):
+        own = weights[face == of]
+        assert_allclose(own.sum(axis=1), 1)
+        assert own.min() >= 0
+        assert_allclose((own > 0.5).mean(axis=0), 1 / 4, atol=3e-3)
+
+
+def test_the_nearest_point_is_seen_in_its_light() -> None:
+    """Seen along x, with y to the right and z up: light falls from the eye, and from all sides."""
+    frame = [[0.0, -1, -1], [0, 1, -1], [0, 1, 1], [0, -1, 1]]
+    points = np.array([*frame, [2, 0.5, 0.5], [-2, 0.5, 0.5], [0, -0.5, 0.5], [0, -0.5, -0.5]])
+    normals = np.array([[1.0, 0, 0]] * 6 + [[0, 1, 0], [0, 0, -1]])
+    colours = np.array([[0, 0, 0]] * 4 + [RED, GREEN, [200] * 3, [100] * 3], dtype=np.uint8)
+    picture = room._seen(points, normals, colours, np.array([3.0, 0, 0]))
+
+    def seen(y: float, z: float) -> list[int]:
+        column, line = (64 * (0.5 + 0.46 * y), 64 * (0.5 - 0.46 * z))
+        return picture[int(line), int(column)].tolist()
+
+    assert seen(0.5, 0.5) == RED
+    assert seen(-0.5, 0.5) == [70] * 3
+    assert seen(-0.5, -0.5) == [35] * 3
+    assert seen(0.0, 0.0) == [255] * 3
+    behind = room._seen(points, normals, colours, np.array([-1.0, 0, 0]))
+    assert behind[int(64 * (0.5 - 0.46 * 0.5)), int(64 * (0.5 - 0.46 * 0.5))].tolist() == GREEN
+
+
+def test_the_picture_shows_both_sides_and_the_layout() -> None:
+    picture = room.preview(SQUARE, TEXTURE)
+    assert picture.shape == (64, 192, 3)
+    assert_array_equal(picture[:, 128:], room._layout(SQUARE, TEXTURE))
+    for begin in (0, 64):  # the square fills part of each picture, and white is around it
+        white = (picture[:, begin : begin + 64] == 255).all(axis=2).mean()
+        assert 0.2 < white < 0.9
