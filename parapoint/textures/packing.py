@@ -9,10 +9,9 @@ from parapoint.surfaces.parameterization import Charted, Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray
 from parapoint.textures.placing import BORDER, Placing
 
-RESOLUTION = 1024
-"""Texels a side of the grid on which xatlas moves the charts about."""
-BRUTE_FORCE = 64
-"""Most charts that are tried at all places of the grid; more at some, drawn at random."""
+RESOLUTIONS = (512, 724, 1024)
+"""Texels a side of the grids on which xatlas moves the charts about; the densest result counts.
+Which one that is is chance: the packer draws places at random."""
 PASSES = 2
 """The space between charts is a share of the square, whose side is known after a first pass."""
 
@@ -28,13 +27,17 @@ def packed(charted: Charted, border: float = BORDER) -> Charted:
         border: width that stays free around the map and between charts, in sides of the square.
     """
     held = charted.map
+    rows = np.unique(held.corners)
+    layouts = [held.uv]
     if int(held.charts().max(initial=0)) > 0:
-        uv = _packed(held, border)
-        charted = Charted(charted.mesh, Parameterization(uv, held.corners, report=held.report))
-    return Placing.smallest(charted.map.uv[np.unique(held.corners)], border).of(charted)
+        layouts = [_packed(held, border, resolution) for resolution in RESOLUTIONS]
+    placings = [Placing.smallest(uv[rows], border) for uv in layouts]
+    best = max(range(len(layouts)), key=lambda k: placings[k].scale)
+    placed = Parameterization(placings[best](layouts[best]), held.corners)
+    return Charted(charted.mesh, placed)
 
 
-def _packed(held: Parameterization, border: float) -> FloatArray:
+def _packed(held: Parameterization, border: float, resolution: int) -> FloatArray:
     """(T, 2) the map with its charts beside one another, in its own scale."""
     faces, label = held.corners, held.charts()
     low = held.uv[faces.reshape(-1)].min(axis=0)
@@ -46,10 +49,9 @@ def _packed(held: Parameterization, border: float) -> FloatArray:
         atlas = xatlas.Atlas()
         atlas.add_uv_mesh(((held.uv - low) / extent).astype(np.float32), faces.astype(np.uint32))
         options = xatlas.PackOptions()
-        options.resolution = RESOLUTION
+        options.resolution = resolution
         options.padding = padding
         options.rotate_charts = False  # by xatlas's way of swapping x and y, which mirrors them
-        options.bruteForce = len(np.unique(label)) <= BRUTE_FORCE
         atlas.generate(xatlas.ChartOptions(), options)
         padding = int(np.ceil(border * max(atlas.width, atlas.height)))
     _, indices, found = atlas[0]
