@@ -1,8 +1,8 @@
 """The models of the benchmark: where each comes from, what is known about it, and how to load it.
 
 `models.json` is the registry. It has one entry for each file: its address at a commit, its sha256,
-its licence, and what was measured on it. `published.json` holds the figures that papers print,
-under the names that the models have there.
+its licence, and what was measured on it. `published/` has a
+file for each source of published figures, under the names that the models have there.
 
 A model's `claim` says how sure we are that it is the model of a paper: "same model", "likely" or
 "stand-in". No public file is proven to be the authors' own, so a measured figure is compared with a
@@ -56,6 +56,9 @@ class PublishedFigure(NamedTuple):
         value: the number as printed.
         source: paper and table.
         note: how it was obtained, if that matters.
+        unit: of the value; "" for a number without one.
+        tolerance: difference up to which a measured value reproduces it.
+        trust: where we have it from, and what is not known about it.
     """
 
     paper_name: str
@@ -63,7 +66,10 @@ class PublishedFigure(NamedTuple):
     metric: str
     value: float
     source: str
-    note: str = ""
+    note: str
+    unit: str
+    tolerance: float
+    trust: str
 
 
 @dataclass(frozen=True)
@@ -122,8 +128,8 @@ class MissingModelError(InputError):
 
 
 def _data(name: str) -> Any:
-    """The content of a JSON file next to this module."""
-    return json.loads(Path(__file__).with_name(name).read_text(encoding="utf-8"))
+    """The content of a JSON file next to, or below, this module."""
+    return json.loads(Path(__file__).parent.joinpath(name).read_text(encoding="utf-8"))
 
 
 @cache
@@ -135,8 +141,32 @@ def registry() -> dict[str, Model]:
 
 @cache
 def published_figures() -> tuple[PublishedFigure, ...]:
-    """All figures of `published.json`."""
-    return tuple(PublishedFigure(**row) for row in _data("published.json"))
+    """All figures of the files in `published/`, source by source.
+
+    Two values agree within the larger of a share of the published one and an absolute difference,
+    which each file states: a share for what seeds and iterations change, half of the last digit for
+    what printing does.
+    """
+    found = []
+    for path in sorted((Path(__file__).parent / "published").glob("*.json"), reverse=True):
+        content = _data(f"published/{path.name}")
+        shared = {name: content[name] for name in ("metric", "unit", "trust")}
+        for row in content["figures"]:
+            tolerance = max(
+                content["relative_tolerance"] * row["value"], content["absolute_tolerance"]
+            )
+            found.append(
+                PublishedFigure(
+                    paper_name=row["model"],
+                    method=row["method"],
+                    value=row["value"],
+                    source=f"{content['source']}, {row['place']}",
+                    note=row.get("note", ""),
+                    tolerance=tolerance,
+                    **shared,
+                )
+            )
+    return tuple(found)
 
 
 def names() -> list[str]:

@@ -35,7 +35,7 @@ DESCENDING = 0.8
 """Share of the time budget after which a map is improved no more."""
 
 
-@dataclass
+@dataclass(repr=False)
 class ComputedMap(Estimator):
     """A free-boundary UV map of a bare point cloud, computed without training.
 

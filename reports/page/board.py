@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from benchmarks.metrics.grades import FROM_POINTS
 from benchmarks.metrics.metric import GROUPS
 from benchmarks.metrics.table import METRICS
 from reports.contents import (
@@ -17,6 +18,8 @@ from reports.contents import (
 from reports.means import STATISTICS, common_cases, common_values, own_values, statistic
 from reports.ranking import TIMES, Mark, flagged, marks, may_rank, means_may_rank
 from reports.tables.leaderboard import SHOWN, definition, page_of
+from reports.tables.overall import COUNTED, CRITERIA, halves
+from reports.tables.statistics import quantile
 from reports.tables.table import Column, metric_column
 
 Entry = tuple[str, float | str | None, Mark]
@@ -37,6 +40,12 @@ def data(suites: Sequence[Contents]) -> dict[str, object]:
     return {
         "metrics": [_about(name) for name in names],
         "shown": [name for name in SHOWN if name in names],
+        "criteria": list(CRITERIA),
+        "counted": list(COUNTED),
+        "quantiles": [
+            quantile(count) if count > 1 else None
+            for count in range(1 + max(len(contents.cases) for contents in suites))
+        ],
         "suites": [_suite(contents, names) for contents in suites],
     }
 
@@ -60,6 +69,7 @@ def _suite(contents: Contents, names: Sequence[str]) -> dict[str, object]:
             {"name": case, "page": page_of(contents, case), "maps": _maps(contents, case, names)}
             for case in contents.cases
         ],
+        "won": {name: _digits(contents, name) for name in CRITERIA},
         "common": len(common_cases(contents, contents.cases)),
         "summaries": {
             name: {
@@ -84,6 +94,14 @@ def _suite(contents: Contents, names: Sequence[str]) -> dict[str, object]:
     }
 
 
+def _digits(contents: Contents, criterion: str) -> list[str]:
+    """For each model a digit for each pair, method by method: how it ends for the first, in halves.
+
+    Only pairs of methods with one chart, or of those with many, are compared on the page.
+    """
+    return ["".join(map(str, model.ravel())) for model in halves(contents, criterion)]
+
+
 def _method(contents: Contents, label: Label) -> dict[str, object]:
     """What the page says of a method beside its metrics: how its cells ended, and why."""
     rows = [row for row in contents.rows if contents.labels[row.id] == label]
@@ -93,6 +111,8 @@ def _method(contents: Contents, label: Label) -> dict[str, object]:
     return {
         "name": label.short,
         "detail": "many charts, not ranked" if atlas else label.detail,
+        "charts": "many" if atlas else "one",
+        "input": "points" if label.method in FROM_POINTS else "mesh",
         "ok": f"{len(rows) - len(bad)}/{len(rows)}",
         "share": (len(rows) - len(bad)) / len(rows),
         "bad": ", ".join(f"{count} {status}" for status, count in counts.items()),

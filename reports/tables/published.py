@@ -1,70 +1,99 @@
-"""Published figures beside measured ones, and what may be concluded from the two."""
+"""Published figures beside measured ones, and what may be concluded from the two.
+
+Each published figure of a model has a verdict: reproduced, better, worse, or not comparable; and a
+reason. It is not comparable where our file is no more than a stand-in for the paper's, where the
+map was got in another way, where our map is broken, or where the method has not run here.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal
 
-from benchmarks.cases.models import Model, registry
+from benchmarks.cases.models import Model, PublishedFigure, registry
+from benchmarks.metrics.table import METRICS
+from reports.ranking import may_rank
 
 if TYPE_CHECKING:
     from reports.contents import Contents, Label
 
 METRIC = "angle_difference_mean"
+"""The metric of which tables have columns of published figures."""
 
 AUTHORS = ("SLIM", "ParaPoint", "FAM")
 """Methods with published figures, in the order of the tables."""
 
-SAME_METHOD = {
+SAME_METHOD: dict[str, tuple[str, dict[str, object]]] = {
     "SLIM": ("slim", {"energy": "symmetric_dirichlet"}),
     "ParaPoint": ("parapoint", {"preset": "paper"}),
     "FAM": ("fam", {}),
 }
 """The method here, and the parameters it must have, that a published figure speaks of."""
 
-RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 0.1, 0.005
-"""Two figures agree within the larger of a tenth of the published one and half its last digits."""
+CUT_BY_HAND = "cut by hand"
+"""The note of a figure whose model somebody cut by hand, which nobody has done here."""
+
+Word = Literal["reproduced", "better", "worse", "not comparable"]
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """A measured value against the one that was published for the method.
+    """A published figure, and what was measured here for the same method and model.
 
     Attributes:
         case: the model.
-        paper_name: the model that it stands for.
-        claim: how sure that is.
-        label: the method.
-        measured: mean over the seeds.
-        published: as printed.
-        note: how the published figure was obtained, where that matters.
+        claim: how sure it is that our file is the paper's model.
+        figure: the published figure.
+        label: the method here; None where it has not run.
+        measured: mean over the seeds; None where there is no map.
+        grade: of the map, the worst of the seeds; "" where there is none.
     """
 
     case: str
-    paper_name: str
     claim: str
-    label: Label
-    measured: float
-    published: float
-    note: str
+    figure: PublishedFigure
+    label: Label | None
+    measured: float | None
+    grade: str
 
     @property
-    def tolerance(self) -> float:
-        """Up to this difference the two agree."""
-        return max(RELATIVE_TOLERANCE * self.published, ABSOLUTE_TOLERANCE)
+    def word(self) -> Word:
+        """The verdict."""
+        return self._judged[0]
+
+    @property
+    def why(self) -> str:
+        """The reason for the verdict, in a few words."""
+        return self._judged[1]
 
     @property
     def text(self) -> str:
-        """The verdict in words; for a stand-in there is none."""
+        """Verdict and reason."""
+        return f"{self.word}: {self.why}"
+
+    @property
+    def _judged(self) -> tuple[Word, str]:
+        if self.label is None:
+            return "not comparable", "the method has not run here"
+        if self.measured is None:
+            return "not comparable", "there is no map here"
         if self.claim not in {"same model", "likely"}:
-            return "none: stand-in"
-        difference = self.measured - self.published
-        if abs(difference) <= self.tolerance:
-            said = "agrees"
-        else:
-            said = "lower (better)" if difference < 0 else "higher (worse)"
-        return f"{said}; published: {self.note}" if self.note else said
+            return "not comparable", "our file is a stand-in"
+        if self.figure.note == CUT_BY_HAND:
+            return "not comparable", f"published: {CUT_BY_HAND}"
+        metric = METRICS[self.figure.metric]
+        if not may_rank(self.grade, angles=metric.group == "conformal"):
+            return "not comparable", f"our map is {self.grade}"
+        difference = self.measured - self.figure.value
+        if abs(difference) <= self.figure.tolerance:
+            return "reproduced", f"within {self.figure.tolerance:.3f}"
+        side = "lower" if difference < 0 else "higher"
+        said = f"{side} by {abs(difference):.3f}"
+        if self.grade == "collapsed":
+            said += ", but our map is collapsed"
+        return ("better" if side == metric.better else "worse"), said
 
 
 def model(case: str) -> Model | None:
@@ -87,29 +116,39 @@ def published_values(case: str) -> dict[str, float]:
 
 
 def verdicts(contents: Contents) -> list[Verdict]:
-    """Every measured value that a published one speaks of, in the order of the tables."""
-    measured = contents.means.set_index(["case", "label"])[METRIC]
+    """Every published figure of the models of a suite, in the order of the tables.
+
+    A figure has a verdict for each method here that it speaks of, such as SLIM after one iteration
+    and after twenty; and one that says so where there is none.
+    """
     found = []
     for case in contents.cases:
         entry = model(case)
         if entry is None or not entry.paper_name:
             continue
-        for label in contents.methods:
-            value = measured.get((case, label.short))
-            for figure in entry.published:
-                method, needed = SAME_METHOD.get(figure.method, ("", {}))
-                fits = label.method == method and needed.items() <= label.parameters.items()
-                if figure.metric != METRIC or not fits or value is None or math.isnan(value):
-                    continue
-                found.append(
-                    Verdict(
-                        case,
-                        entry.paper_name,
-                        claim_text(case),
-                        label,
-                        float(value),
-                        figure.value,
-                        figure.note if figure.note == "cut by hand" else "",
-                    )
-                )
+        for figure in entry.published:
+            labels = [label for label in contents.methods if _speaks_of(figure, label)]
+            found += list(_verdicts(contents, case, figure, labels))
     return found
+
+
+def _speaks_of(figure: PublishedFigure, label: Label) -> bool:
+    """Whether a figure was published for a method, with these parameters."""
+    method, needed = SAME_METHOD.get(figure.method, ("", {}))
+    return label.method == method and needed.items() <= label.parameters.items()
+
+
+def _verdicts(
+    contents: Contents, case: str, figure: PublishedFigure, labels: list[Label]
+) -> Iterator[Verdict]:
+    """The verdicts of a figure, one for each label."""
+    claim = claim_text(case)
+    if not labels:
+        yield Verdict(case, claim, figure, None, None, "")
+    for label in labels:
+        record: dict[str, Any] = contents.records.get((case, label.short)) or {}
+        value = record.get(figure.metric)
+        known = isinstance(value, float) and not math.isnan(value)
+        yield Verdict(
+            case, claim, figure, label, value if known else None, str(record.get("grade") or "")
+        )

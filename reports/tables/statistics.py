@@ -139,8 +139,12 @@ def half_width(values: Floats) -> float:
     """Half of the confidence interval of the mean of (n,) values (Student 1908); NaN for one."""
     if len(values) < 2:
         return math.nan
-    spread = float(np.std(values, ddof=1) / math.sqrt(len(values)))
-    return spread * float(stats.t.ppf((1 + CONFIDENCE) / 2, len(values) - 1))
+    return quantile(len(values)) * float(np.std(values, ddof=1) / math.sqrt(len(values)))
+
+
+def quantile(count: int) -> float:
+    """What the standard error of a mean of so many values is multiplied by; NaN for one."""
+    return float(stats.t.ppf((1 + CONFIDENCE) / 2, count - 1)) if count > 1 else math.nan
 
 
 def seed_variance(contents: Contents) -> Table | None:

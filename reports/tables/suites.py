@@ -30,6 +30,7 @@ from reports.tables.notes import (
     load_notes,
     method_notes,
 )
+from reports.tables.overall import overall
 from reports.tables.published import AUTHORS, Verdict, claim_text, published_values, verdicts
 from reports.tables.statistics import paired_tests, seed_variance
 from reports.tables.table import (
@@ -140,7 +141,9 @@ def supplement(contents: Contents) -> Table | None:
     if not meshes:
         return None
     judged: dict[tuple[str, str], Verdict] = {
-        (verdict.case, verdict.label.short): verdict for verdict in verdicts(contents)
+        (verdict.case, verdict.label.short): verdict
+        for verdict in verdicts(contents)
+        if verdict.label is not None and verdict.figure.metric == ANGLE
     }
     without = f"{ANGLE}_without_spanning"
     area_without = f"{AREA}_without_spanning"
@@ -300,43 +303,53 @@ def comparison(contents: Contents, names: Sequence[str] = ()) -> Table:
 
 
 def against_published(contents: Contents) -> Table | None:
-    """Measured against published numbers with claim, tolerance and verdict; None without any."""
+    """Every published figure of the models with its verdict and why; None without any."""
     judged = verdicts(contents)
-    if not judged:
+    if all(verdict.label is None for verdict in judged):
         return None
     blocks: dict[str, list[Mapping[str, Value]]] = {}
     for verdict in judged:
+        figure, measured = verdict.figure, verdict.measured
         blocks.setdefault(verdict.case, []).append(
             {
-                "case": f"{verdict.case} (paper: {verdict.paper_name})",
-                "claim": claim_text(verdict.case),
-                "method": verdict.label.text,
-                "measured": verdict.measured,
-                "published": verdict.published,
-                "difference": verdict.measured - verdict.published,
-                "tolerance": verdict.tolerance,
-                "verdict": verdict.text,
+                "case": f"{verdict.case} (paper: {figure.paper_name})",
+                "claim": verdict.claim,
+                "figure": f"{figure.method}, {figure.note}" if figure.note else figure.method,
+                "method": verdict.label.text if verdict.label else "",
+                "metric": f"{metric_column(figure.metric).title} [{figure.unit}]",
+                "measured": measured,
+                "published": figure.value,
+                "tolerance": figure.tolerance,
+                "verdict": verdict.word,
+                "why": verdict.why,
             }
         )
+    sources = {verdict.figure.source.rpartition(", ")[0]: verdict.figure for verdict in judged}
     return Table(
         name="published",
         title="Published against measured",
         caption=(
-            "Conformality measured here against the figure that was published for the method. A "
-            "verdict is given only where our file is, or likely is, the authors' own model."
+            "Each figure that a paper prints for one of the models, against what was measured "
+            "here. Reproduced: within the tolerance. Better and worse: beyond it. A verdict is "
+            "given only where our file is, or likely is, the authors' own model."
         ),
         columns=(
             CASE,
             Column("claim", "Our file is", text=True, once=True),
+            Column("figure", "Published for", text=True),
             METHOD,
+            Column("metric", "Metric", text=True),
             Column("measured", "measured", digits=4),
             Column("published", "published"),
-            Column("difference", "difference"),
             Column("tolerance", "tolerance"),
             Column("verdict", "Verdict", text=True),
+            Column("why", "Why", text=True),
         ),
         blocks=tuple(tuple(rows) for rows in blocks.values()),
-        notes=(environment_note(contents),),
+        notes=(
+            *(f"{source}: {figure.trust}." for source, figure in sources.items()),
+            environment_note(contents),
+        ),
     )
 
 
@@ -407,6 +420,7 @@ def tables(contents: Contents) -> list[Table]:
     made = [
         ablation(contents),
         success(contents),
+        overall(contents),
         means_by_kind(contents),
         conformality(contents),
         against_published(contents),

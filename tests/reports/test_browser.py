@@ -13,6 +13,7 @@ from playwright.sync_api import sync_playwright
 
 from benchmarks.rendering.maps import Map
 from reports.contents import contents
+from reports.tables.overall import shares
 
 from .conftest import HAND, NEFERTITI
 
@@ -105,6 +106,42 @@ def test_the_leaderboard_sorts_and_filters(opened):
     page.select_option("select[name=one]", label="charts")
     assert column(page, 2) != before
     assert set(column(page, 2)) <= {"1.0", "skipped", ""}
+
+
+def test_the_overall_order_is_the_table_s_and_the_address_keeps_the_choice(opened, reported):
+    page = opened("index.html")
+    (table,) = contents(reported)[:1]
+    expected = {one.method: f"{100 * one.share:.1f} %" for one in shares(table)}
+    shown = dict(zip(column(page, 1), column(page, 2), strict=True))
+    assert {name.split("\n")[0]: text.split("\n")[0] for name, text in shown.items()} == expected
+    page.select_option("select[name=input]", "points")
+    assert len(column(page, 1)) == 1
+    page.select_option("select[name=input]", "any")
+    page.select_option("select[name=view]", "model")
+    page.select_option("select[name=budget]", "1")
+    page.locator("#filters summary", has_text="Methods").click()
+    page.locator("input[name=method]").first.uncheck()
+    before = column(page, 2)
+    address = page.url
+    assert "#" in address
+    page.goto("about:blank")
+    page.goto(address)
+    assert page.locator("select[name=budget]").input_value() == "1"
+    assert not page.locator("input[name=method]").first.is_checked()
+    assert column(page, 2) == before
+    page.select_option("select[name=view]", "method")
+    page.select_option("select[name=budget]", "any")
+    page.locator("#filters summary", has_text="Methods").click()
+    page.locator("input[name=method]").first.check()
+    assert page.url.endswith("#")
+
+
+def test_a_map_that_takes_too_long_loses(opened):
+    """All maps took a quarter of a second; the time allowed is patched below that."""
+    page = opened("index.html")
+    page.evaluate("document.querySelector('[name=budget]').options[1].value = '0.1'")
+    page.select_option("select[name=budget]", index=1)
+    assert {text.split("\n")[0] for text in column(page, 2)} == {"50.0 %"}
 
 
 def test_a_model_s_page_is_reached_drawn_and_switched(opened, tmp_path):

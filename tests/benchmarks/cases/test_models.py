@@ -18,6 +18,7 @@ from numpy.testing import assert_allclose
 from benchmarks.cases import models
 from benchmarks.cases.builtin import BUILTIN
 from benchmarks.cases.models import MissingModelError
+from benchmarks.metrics.table import METRICS
 from parapoint import InputError, Mesh, PointCloud
 from parapoint.files.reading import read_parameterized
 
@@ -92,7 +93,13 @@ def test_published_figures_are_those_of_the_papers():
     assert figures("camelhead") == {"SLIM": 0.349, "FAM": 0.088}
     assert figures("tooth") == {}
     names = {model.paper_name for model in MODELS}
-    assert all(row.paper_name in names and row.source for row in models.published_figures())
+    for row in models.published_figures():
+        assert row.paper_name in names
+        assert row.metric in METRICS
+        assert row.unit == METRICS[row.metric].unit
+        assert row.tolerance == max(0.1 * row.value, 0.005)
+        assert row.source.startswith("Zhang, Hou, ")
+        assert row.trust.startswith(("as printed", "second hand"))
 
 
 @pytest.mark.parametrize("model", MODELS, ids=lambda model: model.name)

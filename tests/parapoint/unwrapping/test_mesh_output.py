@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from PIL import Image
-from plyfile import PlyData, PlyElement
 
 from parapoint import InputError, Mesh, Parameterization
 from parapoint.commands.mesh_output import mesh_output
 from parapoint.files.gltf import opened
 from parapoint.files.mesh_writers import write_glb, write_ply
 from parapoint.files.painting import painting_of
+from parapoint.files.ply import Table
+from parapoint.files.ply import opened as opened_ply
 from parapoint.files.reading import read_parameterized, read_polygons
 from parapoint.surfaces.parameterization import Charted
 
@@ -136,25 +137,50 @@ def test_a_picture_that_cannot_be_read_is_one_line(textured, tmp_path) -> None:
         written(textured, tmp_path / "new.obj")
 
 
-def ply_sheet(path, text):
-    """The sheet as PLY with all sorts of properties."""
+def ply_sheet(path, text) -> None:
+    """The sheet as PLY with all sorts of properties, of either encoding."""
     points, quads = grid()
-    vertex = np.zeros(
-        len(points),
-        [*((n, "f8") for n in "xyz"), ("u", "f4"), ("v", "f4"), ("red", "u1"), ("q", "i2")],
-    )
-    for name, column in zip("xyz", points.T, strict=True):
-        vertex[name] = column
-    vertex["u"], vertex["v"] = points[:, 0] / SIDE, points[:, 1] / SIDE
-    vertex["red"], vertex["q"] = np.arange(len(points)), -np.arange(len(points))
-    face = np.zeros(len(quads), [("vertex_indices", object), ("flags", "u1")])
-    face["vertex_indices"] = [np.array(quad, dtype="u4") for quad in quads]
-    face["flags"] = np.arange(len(quads))
-    edge = np.array([(0, 1), (1, 2)], [("vertex1", "i4"), ("vertex2", "i4")])
-    elements = [PlyElement.describe(vertex, "vertex"), PlyElement.describe(face, "face")]
-    elements.append(PlyElement.describe(edge, "edge"))
-    comments = ["TextureFile old one.png", "made by hand"]
-    PlyData(elements, text=text, byte_order="=" if text else ">", comments=comments).write(path)
+    count = np.arange(len(points))
+    names = [("double x", "d"), ("double y", "d"), ("double z", "d"), ("float u", "f")]
+    names += [("float v", "f"), ("uchar red", "B"), ("short q", "h")]
+    vertex = np.column_stack([points, points[:, :2] / SIDE, count, -count])
+    kind = "ascii" if text else "binary_big_endian"
+    header = ["ply", f"format {kind} 1.0", "comment TextureFile old one.png", "comment by hand"]
+    header += [f"element vertex {len(points)}", *(f"property {name}" for name, _ in names)]
+    header += [f"element face {len(quads)}", "property list uchar uint vertex_indices"]
+    header += ["property uchar flags", "element edge 2", "property int vertex1"]
+    header += ["property int vertex2", "end_header", ""]
+    rows = [
+        *(
+            (codes, row)
+            for codes in ["".join(code for _, code in names)]
+            for row in vertex.tolist()
+        ),
+        *(("B4IB", [4, *quad, k]) for k, quad in enumerate(quads)),
+        *(("2i", row) for row in ([0, 1], [1, 2])),
+    ]
+    if text:
+        body = "\n".join(" ".join(f"{value:.9g}" for value in row) for _, row in rows).encode()
+    else:
+        body = b"".join(
+            struct.pack(
+                f">{codes}",
+                *(v if c in "df" else int(v) for v, c in zip(row, spelt(codes), strict=True)),
+            )
+            for codes, row in rows
+        )
+    path.write_bytes("\n".join(header).encode() + body)
+
+
+def spelt(codes) -> str:
+    """Codes of struct without numbers of repetitions."""
+    return codes.replace("4I", "IIII").replace("2i", "ii")
+
+
+def elements(path) -> tuple[list[str], dict[str, Table]]:
+    """The comments and the elements of a PLY file."""
+    comments, tables = opened_ply(path.read_bytes())
+    return comments, {table.name: table for table in tables}
 
 
 @pytest.mark.parametrize("text", [True, False])
@@ -163,26 +189,23 @@ def test_a_ply_file_keeps_all_but_the_uvs(text, tmp_path) -> None:
     Image.fromarray(old_picture()).save(tmp_path / "old one.png")
     ply_sheet(source, text)
     placed = written(source, out)
-    before, after = PlyData.read(source), PlyData.read(out)
-    assert after.comments == ["TextureFile new.png", "made by hand"]
-    assert after.text == text
-    count = len(before["vertex"].data)
-    seam = SIDE + 1  # one copy of each vertex where x is 2
-    assert len(after["vertex"].data) == count + seam
+    _, before = elements(source)
+    comments, after = elements(out)
+    assert comments == ["TextureFile new.png", "by hand"]
+    count, seam = before["vertex"].count, SIDE + 1  # one copy of each vertex where x is 2
+    assert after["vertex"].count == count + seam
+    assert list(after["vertex"].columns) == ["x", "y", "z", "red", "q", "s", "t"]
     for name in ("x", "y", "z", "red", "q"):
-        assert np.array_equal(after["vertex"].data[name][:count], before["vertex"].data[name])
-    assert {"u", "v"}.isdisjoint(after["vertex"].data.dtype.names)
-    assert np.array_equal(after["face"].data["flags"], before["face"].data["flags"])
-    assert np.array_equal(after["edge"].data, before["edge"].data)
-    copied = after["vertex"].data["q"][count:]
-    table = after["vertex"].data
-    for old, new in zip(
-        before["face"].data["vertex_indices"], after["face"].data["vertex_indices"], strict=True
-    ):
-        assert [k if k < count else -copied[k - count] for k in new.tolist()] == old.tolist()
-    corners = np.stack(after["face"].data["vertex_indices"])
-    wedges = np.stack(after["face"].data["texcoord"]).reshape(-1, 4, 2)
-    assert_allclose(wedges[..., 0], table["s"][corners], atol=1e-6)
+        kept = after["vertex"].columns[name].values
+        assert kept.dtype == before["vertex"].columns[name].values.dtype
+        assert np.array_equal(kept[:count], before["vertex"].columns[name].values)
+    assert np.array_equal(after["face"].columns["flags"].values, np.arange(SIDE**2))
+    assert after["edge"].columns["vertex2"].values.tolist() == [1, 2]
+    index = after["face"].columns["vertex_indices"].values
+    original = -after["vertex"].columns["q"].values[index]
+    assert np.array_equal(original, before["face"].columns["vertex_indices"].values)
+    wedges = after["face"].columns["texcoord"].values.reshape(-1, 2)
+    assert_allclose(wedges[:, 0], after["vertex"].columns["s"].values[index], atol=1e-6)
     own = read_parameterized(out)[1]
     assert_allclose(own.uv[own.corners], placed.map.uv[placed.map.corners])
     at = middles(source)
@@ -200,8 +223,8 @@ def test_a_seam_through_polygons_of_a_ply_file_makes_triangles(tmp_path) -> None
     output = mesh_output(given, str(source), str(out), None, 4)
     facts = output.write(placed, output.picture(placed))
     assert facts["polygons_split"] == SIDE**2
-    after = PlyData.read(out)
-    assert after["face"].data["flags"].tolist() == [k // 2 for k in range(2 * SIDE**2)]
+    flags = elements(out)[1]["face"].columns["flags"].values
+    assert flags.tolist() == [k // 2 for k in range(2 * SIDE**2)]
     mesh, own = read_parameterized(out)
     assert_allclose(own.uv[own.corners], uv[apart])
     assert np.array_equal(mesh.vertices[mesh.faces], given.mesh.vertices[given.mesh.faces])
