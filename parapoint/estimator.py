@@ -303,9 +303,10 @@ class Estimator(ABC):
         model = dataclasses.replace(self, seed=seed)  # type: ignore[type-var]  # a subclass is a dataclass
         at = coordinates(surface, 3)
         model._fit(surface, Session(watched=at if len(at) <= MOST_WATCHED else None))  # noqa: SLF001 (a copy of this one)
-        uv = unmapped(surface, model.fitted_.flatten(at))
         if isinstance(surface, Mesh):
+            uv = model.fitted_.flatten(at)
             return Parameterization(uv, surface.faces, model.trace_, model.report_)
+        uv = unmapped(surface, model.transform(at))
         return PointParameterization(uv, model.trace_, model.report_)
 
     def save(self, folder: str | Path) -> None:

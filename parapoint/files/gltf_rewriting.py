@@ -63,32 +63,36 @@ def rewrite_gltf(
         made.add_material(picture)
     primitives = []
     begin = 0
-    for primitive, transform in placed:
+    for one in placed:
+        primitive = one.primitive
         if primitive.get("mode", TRIANGLES) not in {4, 5, 6}:
             primitives.append(primitive)
             continue
         faces = scene.triangles(primitive)
         corners = parameterization.corners[begin : begin + len(faces)]
         begin += len(faces)
-        if np.linalg.det(transform[:3, :3]) < 0:  # the reader turned them round
+        if np.linalg.det(one.transform[:3, :3]) < 0:  # the reader turned them round
             corners = corners[:, ::-1]
         primitives.append(made.primitive(primitive, faces, corners, parameterization.uv, uv_set))
-    _place(scene, iter(primitives))
+    _place(scene, [one.node for one in placed], iter(primitives))
     data = made.file()
     with complete_file(out) as file:
         file.write(data)
     return uv_set
 
 
-def _place(scene: Gltf, primitives: Iterator[dict[str, Any]]) -> None:
+def _place(
+    scene: Gltf, nodes: list[dict[str, Any] | None], primitives: Iterator[dict[str, Any]]
+) -> None:
     """Put the new primitives into the meshes; of a mesh that several nodes share, into copies."""
     meshes = scene.tree["meshes"]
-    if not scene.tree.get("nodes"):
+    if nodes[0] is None:
         for mesh in meshes:
             mesh["primitives"] = [next(primitives) for _ in mesh["primitives"]]
         return
     done: set[int] = set()
-    for node, _ in list(scene.placed_nodes()):
+    for node in {id(node): node for node in nodes}.values():
+        assert node is not None
         if node["mesh"] in done:
             meshes.append(dict(meshes[node["mesh"]]))
             node["mesh"] = len(meshes) - 1

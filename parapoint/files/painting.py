@@ -198,7 +198,7 @@ def _gltf(path: Path) -> tuple[tuple[Material, ...], IntArray]:
     materials.append(Material())
     of = [
         np.full(len(tree.triangles(one)), one.get("material", len(materials) - 1))
-        for one, _ in tree.placed_primitives()
+        for one in (placed.primitive for placed in tree.placed_primitives())
         if one.get("mode", 4) in {4, 5, 6}
     ]
     return tuple(materials), np.concatenate(of)

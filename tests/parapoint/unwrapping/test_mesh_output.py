@@ -321,7 +321,7 @@ def test_a_glb_file_keeps_all_but_the_uvs(materials, tmp_path, caplog) -> None:
     begin = 0
     assert [mesh["name"] for mesh in tree.tree["meshes"]] == ["sheet", "sheet"]
     assert [node["name"] for node in tree.tree["nodes"]] == ["one", "other"]
-    for primitive, transform in tree.placed_primitives():
+    for primitive, transform, *_ in tree.placed_primitives():
         attributes = primitive["attributes"]
         faces = tree.triangles(primitive)
         found = tree.accessor(attributes[f"TEXCOORD_{number}"])[faces] * [1, -1] + [0, 1]
