@@ -139,7 +139,7 @@ class Gltf:
             return base64.b64decode(uri.partition(",")[2])
         path = (folder / unquote(uri)).resolve()
         if not path.is_relative_to(folder.resolve()) or not path.is_file():
-            raise InputError(f"its file {uri[:80]!r} is not beside it")
+            raise InputError(f"{uri[:80]!r} is not a file beside it")
         data = path.read_bytes()
         self.size += len(data)
         return data
