@@ -105,18 +105,9 @@ def test_a_seam_through_a_polygon_makes_it_triangles_and_says_so(
     assert (tmp_path / "out.obj").read_text().count("\nf ") == 7
 
 
-def test_a_texture_of_the_old_uvs_is_not_shown_with_the_new(box, tmp_path, capsys, caplog) -> None:
-    (tmp_path / "colours.mtl").write_text("newmtl red\nmap_Kd wood.png\n")
-    unfold(box, tmp_path / "out.obj", capsys)
-    assert "were drawn for other UVs" in caplog.text
-    written = (tmp_path / "out.obj").read_text()
-    assert "mtllib" not in written
-    assert "usemtl red" in written
-
-
 def test_other_formats_and_one_uv_a_vertex(box, tmp_path, capsys, caplog) -> None:
     unfold(box, tmp_path / "out.npz", capsys)
-    assert "left out: old UVs, polygons" in caplog.text
+    assert "left out: old UVs, polygons. A .obj file would keep them" in caplog.text
     with np.load(tmp_path / "out.npz") as held:
         assert held["vertices"].shape == (8, 3)
         assert held["uv"].shape == (14, 2)
