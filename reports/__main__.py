@@ -8,6 +8,7 @@ import click
 
 from benchmarks.running.environment import cores
 from parapoint import __version__, console
+from parapoint.commands.memory import memory_option
 
 
 @click.command(
@@ -28,6 +29,7 @@ from parapoint import __version__, console
     type=click.Path(path_type=Path),
     help="An earlier results folder, or another machine's; may be given several times.",
 )
+@memory_option
 def main(folder: Path, exports: bool, against: tuple[Path, ...]) -> None:
     """Write the report, or the comparisons, and say where they are."""
     if against:
