@@ -95,6 +95,8 @@ def run(command: click.Command, arguments: list[str] | None = None) -> Never:
         fail(error.format_message())
     except InputError as error:
         fail(str(error))
+    except ModuleNotFoundError as error:
+        fail(f"{error.name} is not installed; in a checkout, pip install -e '.[bench]' brings it")
     except OSError as error:
         fail(_in_words(error))
     except (KeyboardInterrupt, click.Abort):

@@ -111,12 +111,27 @@ def methods() -> Table:
         try:
             about = registry.describe(name)
         except (ImportError, InputError) as error:
-            _add(table, name, "", "", "", f"cannot be imported: {error}")
+            _add(table, name, "", "", "", str(error))
             continue
         parameters = ", ".join(f"{key}={value}" for key, value in about.parameters.items())
         requires = ", ".join(about.requires)
         _add(table, name, requires, about.deterministic, parameters, about.summary)
     return table
+
+
+def about(method: str) -> list[str]:
+    """What there is to say of a method, line by line; nothing of one that is not installed here."""
+    from baselines import registry
+
+    try:
+        found = registry.describe(registry.RENAMED.get(method, method))
+    except (ImportError, InputError):
+        return []
+    needs = ", ".join(found.requires) or "nothing"
+    return [
+        found.summary,
+        f"Needs: {needs}. The same map for the same seed: {found.deterministic}.",
+    ]
 
 
 def metrics() -> Table:

@@ -10,10 +10,11 @@ import json
 import struct
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import unquote
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from parapoint.errors import InputError
@@ -29,7 +30,7 @@ from parapoint.files.decoding import check_decoded
 from parapoint.surfaces.surface import FloatArray, IntArray
 
 GLTF_TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-GLTF_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+GLTF_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 UNDERSTOOD = {"KHR_mesh_quantization", "KHR_texture_transform", "EXT_mesh_gpu_instancing"}
 """Extensions that are read where a file requires them."""
 APPEARANCE = ("KHR_materials_", "KHR_lights_", "KHR_texture_basisu", "EXT_texture_", "KHR_xmp")
@@ -62,6 +63,22 @@ def gltf(data: bytes, folder: Path, chunk: bytes = b"") -> Content:
     return _Gltf(json.loads(data), folder, chunk, len(data) + len(chunk)).content()
 
 
+class _Placed(NamedTuple):
+    """A primitive where a node of the scene puts it.
+
+    Attributes:
+        primitive: as the file has it.
+        transform: (4, 4) of the node.
+        weights: of its morph targets.
+        skin: number of the skin whose joints move its vertices, or None.
+    """
+
+    primitive: dict[str, Any]
+    transform: FloatArray
+    weights: list[float]
+    skin: int | None
+
+
 class _Gltf:
     """One glTF file while it is read."""
 
@@ -77,6 +94,7 @@ class _Gltf:
             raise InputError(f"needs {unknown[0]}, which is not read; export it without")
         self.tree, self.folder, self.chunk, self.size = tree, folder, chunk, size
         self.buffers: dict[str | int, bytes] = {}
+        self.world: dict[int, FloatArray] = {}  # (4, 4) transform of each node in the scene
 
     def _buffer(self, index: int) -> bytes:
         """The bytes of a buffer, read once: the file's own chunk, in the text, or a file beside."""
@@ -104,31 +122,53 @@ class _Gltf:
     def accessor(self, index: int) -> FloatArray | IntArray:
         """(n, width) values; normalized whole numbers become fractions."""
         item = self.tree["accessors"][index]
-        if "sparse" in item or "bufferView" not in item:
-            raise InputError("has sparse or compressed data, which is not read; export it plain")
-        view = self.tree["bufferViews"][item["bufferView"]]
-        kind = np.dtype(GLTF_TYPES[item["componentType"]])
         width = GLTF_WIDTHS[item["type"]]
+        if item["count"] < 1:
+            raise InputError("has an accessor of impossible size")
+        if "bufferView" in item:
+            array = self._view(item, item["componentType"], item["count"], width)
+        elif "sparse" not in item:
+            raise InputError("has compressed data, which is not read; export it plain")
+        else:  # zeros, of which some are replaced
+            check_decoded(8 * width * item["count"], self.size)
+            array = np.zeros((item["count"], width), GLTF_TYPES[item["componentType"]])
+        if sparse := item.get("sparse"):
+            indices, values = sparse["indices"], sparse["values"]
+            rows = self._view(indices, indices["componentType"], sparse["count"], 1)[:, 0]
+            if rows.max() >= len(array):
+                raise InputError("has a sparse accessor with an index out of range")
+            array = array.copy()
+            array[rows] = self._view(values, item["componentType"], sparse["count"], width)
+        if array.dtype.kind == "f":
+            return array.astype(np.float64)
+        if item.get("normalized"):
+            return np.maximum(array / float(np.iinfo(array.dtype).max), -1.0)
+        return array.astype(np.int64)
+
+    def _view(
+        self, item: dict[str, Any], component: int, count: int, width: int
+    ) -> npt.NDArray[Any]:
+        """(count, width) values as they lie in a buffer view, from the byte that `item` says."""
+        view = self.tree["bufferViews"][item["bufferView"]]
+        kind = np.dtype(GLTF_TYPES[component])
         stride = view.get("byteStride", width * kind.itemsize)
         start = view.get("byteOffset", 0) + item.get("byteOffset", 0)
         raw = self._buffer(view["buffer"])
-        count = item["count"]
         if count < 1 or start < 0 or stride < width * kind.itemsize:
             raise InputError("has an accessor of impossible size")
         if start + (count - 1) * stride + width * kind.itemsize > len(raw):
             raise InputError("ends early, in a buffer")
-        array = np.ndarray((count, width), kind, raw, start, (stride, kind.itemsize))
-        if kind.kind == "f":
-            return array.astype(np.float64)
-        if item.get("normalized"):
-            return np.maximum(array / float(np.iinfo(kind).max), -1.0)
-        return array.astype(np.int64)
+        return np.ndarray((count, width), kind, raw, start, (stride, kind.itemsize))
 
-    def placed_primitives(self) -> list[tuple[dict[str, Any], FloatArray]]:
-        """Each primitive of the scene with its (4, 4) transform."""
+    def placed_primitives(self) -> list[_Placed]:
+        """The primitives of the scene, in order."""
         nodes = self.tree.get("nodes", [])
         if not nodes:
-            return [(p, np.eye(4)) for mesh in self.tree["meshes"] for p in mesh["primitives"]]
+            return [
+                _Placed(primitive, np.eye(4), mesh.get("weights", []), None)
+                for mesh in self.tree["meshes"]
+                for primitive in mesh["primitives"]
+            ]
         scenes = self.tree.get("scenes", [])
         children = {child for node in nodes for child in node.get("children", [])}
         roots = (
@@ -136,7 +176,7 @@ class _Gltf:
             if scenes
             else [index for index in range(len(nodes)) if index not in children]
         )
-        placed: list[tuple[dict[str, Any], FloatArray]] = []
+        placed: list[_Placed] = []
         waiting = [(index, np.eye(4)) for index in reversed(roots)]
         visited: set[int] = set()  # nodes form trees; a file in which they do not must not hang
         while waiting:
@@ -145,12 +185,18 @@ class _Gltf:
                 raise InputError("has a node that hangs in two places")
             visited.add(index)
             node = nodes[index]
-            transform = outer @ _node_transform(node)
+            transform = self.world[index] = outer @ _node_transform(node)
             if "mesh" in node:
-                primitives = self.tree["meshes"][node["mesh"]]["primitives"]
+                mesh = self.tree["meshes"][node["mesh"]]
+                primitives = mesh["primitives"]
+                weights = node.get("weights", mesh.get("weights", []))
                 places = [transform @ local for local in self._instances(node)]
                 check_decoded(128 * (len(placed) + len(places) * len(primitives)), self.size)
-                placed += [(primitive, place) for place in places for primitive in primitives]
+                placed += [
+                    _Placed(primitive, place, weights, node.get("skin"))
+                    for place in places
+                    for primitive in primitives
+                ]
             waiting += [(child, transform) for child in reversed(node.get("children", []))]
         return placed
 
@@ -169,6 +215,30 @@ class _Gltf:
             raise InputError("has instances without a number of their own")
         rows = zip(*given.values(), strict=True)
         return [_node_transform(dict(zip(given, row, strict=True))) for row in rows]
+
+    def _positions(self, placed: _Placed) -> FloatArray:
+        """(n, 3) the vertices of a primitive as the file poses them: morphed, skinned, in place."""
+        attributes, transform = placed.primitive["attributes"], placed.transform
+        local = np.asarray(self.accessor(attributes["POSITION"]), dtype=np.float64)
+        targets = placed.primitive.get("targets", [])
+        for share, target in zip(placed.weights, targets, strict=False):
+            if share and "POSITION" in target:
+                local = local + share * self.accessor(target["POSITION"])
+        if not np.isfinite(local).all():
+            raise InputError("has a position that is not finite")
+        if placed.skin is None or "JOINTS_0" not in attributes:
+            return np.asarray(local @ transform[:3, :3].T + transform[:3, 3])
+        skin = self.tree["skins"][placed.skin]  # its joints move the vertices, and not the node
+        joints = np.stack([self.world[joint] for joint in skin["joints"]])
+        if "inverseBindMatrices" in skin:
+            bound = self.accessor(skin["inverseBindMatrices"]).reshape(-1, 4, 4)
+            joints = joints @ bound.transpose(0, 2, 1)
+        weight = self.accessor(attributes["WEIGHTS_0"])
+        blended = np.einsum(
+            "nj,njkl->nkl", weight, joints[whole(self.accessor(attributes["JOINTS_0"]))]
+        )
+        moved = np.einsum("nkl,nl->nk", blended[:, :3, :3], local) + blended[:, :3, 3]
+        return np.asarray(moved, dtype=np.float64)
 
     def _texture(self, primitive: dict[str, Any]) -> tuple[str, FloatArray]:
         """The UV set of a primitive's base colour, and its (2, 3) transform."""
@@ -192,12 +262,10 @@ class _Gltf:
         """The scene as one content."""
         positions, corners, uvs, uv_corners, points = [], [], [], [], []
         vertex_count = uv_count = decoded = 0
-        for primitive, transform in self.placed_primitives():
+        for placed in self.placed_primitives():
+            primitive, transform = placed.primitive, placed.transform
             attributes = primitive["attributes"]
-            local = self.accessor(attributes["POSITION"])
-            if not np.isfinite(local).all():
-                raise InputError("has a position that is not finite")
-            place = local @ transform[:3, :3].T + transform[:3, 3]
+            place = self._positions(placed)
             mode = primitive.get("mode", 4)
             if mode == 0:
                 points.append(place)

@@ -5,6 +5,7 @@ Ours, since trimesh takes PLY triangle strips for points and mixed binary polygo
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -29,6 +30,8 @@ PLY_TYPES = {
     **dict.fromkeys(("ushort", "uint16"), "u2"),
     **dict.fromkeys(("int", "int32"), "i4"),
     **dict.fromkeys(("uint", "uint32"), "u4"),
+    **dict.fromkeys(("long", "int64"), "i8"),
+    **dict.fromkeys(("ulong", "uint64"), "u8"),
     **dict.fromkeys(("float", "float32"), "f4"),
     **dict.fromkeys(("double", "float64"), "f8"),
 }
@@ -78,10 +81,10 @@ class _Body:
 
 def ply(data: bytes) -> Content:
     """PLY, text or binary of either byte order: polygons and triangle strips, vertex normals."""
-    end = data.find(b"end_header")
-    body_begin = data.find(b"\n", end) + 1
-    if not data.startswith(b"ply") or data[3:4].strip() or end < 0 or not body_begin:
+    closing = re.search(rb"[\r\n]end_header[ \t\r]*\n", data)
+    if not data.startswith(b"ply") or data[3:4].strip() or closing is None:
         raise InputError("has no PLY header")
+    end, body_begin = closing.span()
     encoding, elements = _ply_header(data[3:end].decode("latin-1").splitlines())
     raw = data[body_begin:]
     body = _Body(raw, None if encoding else floats(raw.split(), 1).reshape(-1))

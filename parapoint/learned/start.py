@@ -15,8 +15,8 @@ import numpy as np
 from scipy.sparse import csgraph
 
 from parapoint.computed.flattening import Flattened, flattened
-from parapoint.learned.trainer import tangents_of
 from parapoint.surfaces.cutting import edge_graph, edge_lengths
+from parapoint.surfaces.normals import tangents_of
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
 
 REACH = 0.15
