@@ -32,7 +32,7 @@ def write(folder: Path, *, jobs: int, textured: bool = False, progress: Progress
     report = folder / "report"
     sections = []
     suites = contents(folder)
-    _claim(report)
+    claim(report)
     for suite in suites:
         made = tables.tables(suite)
         name = slug(suite.suite)
@@ -42,12 +42,12 @@ def write(folder: Path, *, jobs: int, textured: bool = False, progress: Progress
         drawn = figures.draw(suite, drawn_in / "pictures", drawn_in, jobs, progress)
         if textured:
             faults += exports.write(suite, report, progress)
-        sections.append(Section(report, suite, made, drawn, faults))
-    return page.write(report, folder, sections)
+        sections.append(Section(report, suite, made, drawn, faults, folder))
+    return page.write(report, str(folder), sections)
 
 
-def _claim(report: Path) -> None:
-    """Make the folder of a report, marked as ours.
+def claim(report: Path) -> None:
+    """Make the folder of a report or a site, marked as ours.
 
     Raises:
         InputError: there is something that is not ours.

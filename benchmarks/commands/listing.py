@@ -119,6 +119,21 @@ def methods() -> Table:
     return table
 
 
+def about(method: str) -> list[str]:
+    """What there is to say of a method, line by line; nothing of one that is not installed here."""
+    from baselines import registry
+
+    try:
+        found = registry.describe(registry.RENAMED.get(method, method))
+    except (ImportError, InputError):
+        return []
+    needs = ", ".join(found.requires) or "nothing"
+    return [
+        found.summary,
+        f"Needs: {needs}. The same map for the same seed: {found.deterministic}.",
+    ]
+
+
 def metrics() -> Table:
     """Each metric with its unit, direction and source."""
     from benchmarks.metrics.table import METRICS

@@ -234,7 +234,7 @@ def test_the_index_shows_every_model_under_every_method_with_grade_and_flips(tmp
             writer.cell(case, mesh, "parapoint", {"preset": "paper"}, result=bad)
         writer.cell("two", mesh, "arap", {}, status="timeout", reason="over 10 s")
     write(tmp_path, jobs=1)
-    section = Section(tmp_path / "report", contents(tmp_path)[0], (), (), ())
+    section = Section(tmp_path / "report", contents(tmp_path)[0], (), (), (), tmp_path)
     assert list(section.examples) == ["one", "two"]
     order = [label.short for label in section.contents.methods]
     shown = {case: dict(zip(order, maps, strict=True)) for case, maps in section.examples.items()}
