@@ -94,7 +94,7 @@ def _folders(sources: Sequence[Path]) -> Iterator[tuple[list[Path], Path]]:
 
 
 def _history(sources: Sequence[Path], folders: Sequence[Path], out: Path) -> list[str]:
-    """Write what moved between the sources, each as a folder; the address of its page, if any cell is shared."""
+    """Write what moved between the sources; the address of its page, if any cell is shared."""
     made, leads = [], []
     for number, after in enumerate(folders):
         for earlier in range(number)[::-1]:
