@@ -14,7 +14,9 @@ EXTRAS = ("uvatlas", "uvunwrap")
 
 
 def install(session: nox.Session, *extras: str) -> None:
-    session.install("-c", "constraints.txt", "-e", f".[{','.join(['bench', 'dev', *extras])}]")
+    """Install the project with what a run needs, and more extras of pyproject.toml."""
+    wanted = ",".join(["bench", "learned", "meshlab", *extras])
+    session.install("-c", "constraints.txt", "-e", f".[{wanted}]")
 
 
 @nox.session
@@ -29,14 +31,14 @@ def lint(session: nox.Session) -> None:
 @nox.session
 def types(session: nox.Session) -> None:
     """Mypy, strict."""
-    install(session, "cluster")
+    install(session, "dev", "cluster")
     session.run("mypy")
 
 
 @nox.session
 def tests(session: nox.Session) -> None:
     """The test suite: `nox -s tests -- -k cutting` runs a part of it."""
-    install(session, "cluster", "uvunwrap")
+    install(session, "dev", "cluster", "uvunwrap")
     # A process a core, each with one thread: more would only wait for each other.
     session.run(
         "pytest",
@@ -124,5 +126,5 @@ def mutants(session: nox.Session) -> None:
 
     tests/mutants/README.md says how, and which survivors are known.
     """
-    install(session, "cluster", "uvunwrap", "mutants")
+    install(session, "dev", "cluster", "uvunwrap", "mutants")
     session.run("python", "tests/mutants/mutants.py", *session.posargs)

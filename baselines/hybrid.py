@@ -44,7 +44,7 @@ class AutomaticSLIM:
         """
         disk = domain(surface)
         run = Run(sound(Mesh(disk.vertices, disk.faces)))
-        run.begin(None)
+        run.begin()
         run.improve()
         if self.price is not None:
             run = grown(run, self.price)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from parapoint.computed.computed_map import ComputedMap
-    from parapoint.errors import InputError
+    from parapoint.errors import InputError, NotFittedError
     from parapoint.learned.parapoint import ParaPoint
     from parapoint.method import Method
     from parapoint.surfaces.parameterization import Parameterization, PointParameterization
@@ -23,6 +23,7 @@ __all__ = [
     "InputError",
     "Mesh",
     "Method",
+    "NotFittedError",
     "ParaPoint",
     "Parameterization",
     "PointCloud",
@@ -34,6 +35,7 @@ LAZY = {
     "InputError": "errors",
     "Mesh": "surfaces.surface",
     "Method": "method",
+    "NotFittedError": "errors",
     "ParaPoint": "learned.parapoint",
     "Parameterization": "surfaces.parameterization",
     "PointCloud": "surfaces.surface",

@@ -93,12 +93,24 @@ def run(command: click.Command, arguments: list[str] | None = None) -> Never:
         fail(error.format_message().removesuffix(".") + more)
     except click.ClickException as error:
         fail(error.format_message())
-    except (InputError, OSError) as error:
+    except InputError as error:
         fail(str(error))
+    except ModuleNotFoundError as error:
+        fail(f"{error.name} is not installed; in a checkout, pip install -e '.[bench]' brings it")
+    except OSError as error:
+        fail(_in_words(error))
     except (KeyboardInterrupt, click.Abort):
         print("interrupted", file=sys.stderr)
         sys.exit(130)
     sys.exit(status if isinstance(status, int) else 0)
+
+
+def _in_words(error: OSError) -> str:
+    """What the system refused, and the file where it is known."""
+    if error.strerror is None:
+        return str(error)
+    said = error.strerror[:1].lower() + error.strerror[1:]
+    return f"{error.filename}: {said}" if error.filename else said
 
 
 def fail(message: str) -> Never:

@@ -7,3 +7,10 @@ class InputError(ValueError):
     The commands print the message and end with exit status 2; every other exception is a bug of
     ours (or of a method, which then becomes a `failed` row).
     """
+
+
+class NotFittedError(InputError, AttributeError):
+    """A model was asked for what only `fit` or `load` gives it.
+
+    An AttributeError too, as scikit-learn's is: `hasattr(model, "points_")` is False before a fit.
+    """

@@ -8,13 +8,13 @@ import logging
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from parapoint import saving
-from parapoint.errors import InputError
+from parapoint.errors import InputError, NotFittedError
 from parapoint.fitting import Fitted, Progress, Session, SurfaceMap
 from parapoint.parameters import (
     LARGEST_SEED,
@@ -26,6 +26,7 @@ from parapoint.parameters import (
 from parapoint.side_by_side import SideBySide, fitted_side_by_side
 from parapoint.surfaces.components import COMPONENTS, parts_of
 from parapoint.surfaces.dimension import checked_dimension
+from parapoint.surfaces.foreign import surface_or_array
 from parapoint.surfaces.frame import Frame
 from parapoint.surfaces.gridding import gridded
 from parapoint.surfaces.parameterization import (
@@ -37,6 +38,9 @@ from parapoint.surfaces.parameterization import (
 from parapoint.surfaces.seam_points import seam_points
 from parapoint.surfaces.strays import far_from, fitted_rows, unmapped
 from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, PointCloud, Surface
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 logger = logging.getLogger("parapoint")
 
@@ -81,6 +85,42 @@ class Estimator(ABC):
     def fit_part(self, surface: Surface, share: float, session: Session) -> Fitted:
         """The map of one part of a surface; see `parapoint.fitting.Strategy`."""
 
+    def __repr__(self) -> str:
+        """The estimator with the parameters that differ from their defaults."""
+        given = (
+            f"{field.name}={getattr(self, field.name)!r}"
+            for field in dataclasses.fields(self)  # type: ignore[arg-type]  # a subclass is a dataclass
+            if getattr(self, field.name) != field.default
+        )
+        return f"{type(self).__name__}({', '.join(given)})"
+
+    def _repr_html_(self) -> str:
+        """The estimator as a notebook shows it: with a picture of its map, once it is fitted."""
+        from parapoint.picturing import html
+
+        return html(self)
+
+    def __sklearn_tags__(self) -> Any:
+        """What scikit-learn, which alone calls this, has to know: this transforms points."""
+        from sklearn.utils import Tags, TargetTags, TransformerTags
+
+        return Tags("transformer", TargetTags(required=False), TransformerTags())
+
+    def __sklearn_is_fitted__(self) -> bool:
+        """Whether there is a map."""
+        return "fitted_" in vars(self)
+
+    def plot(self) -> Figure:
+        """A figure of matplotlib: the surface and its map, in the same colours, seams in black.
+
+        Raises:
+            NotFittedError: nothing is fitted.
+            InputError: matplotlib is not installed.
+        """
+        from parapoint.picturing import figure
+
+        return figure(self)
+
     def check(self) -> None:
         """Check the parameters.
 
@@ -121,7 +161,8 @@ class Estimator(ABC):
 
         Args:
             points: (N, 3) coordinates, a PointCloud, or a Mesh (its vertices, and points on its
-                faces where those do not show its shape). Rows that are not finite, or stray
+                faces where those do not show its shape); or what other libraries have for these
+                (`parapoint.surfaces.foreign`). Rows that are not finite, or stray
                 (`parapoint.surfaces.strays`), are left out, repeated ones
                 count once; `report_` has the numbers. Units are free.
             y: not used.
@@ -144,7 +185,7 @@ class Estimator(ABC):
 
     def _fit(self, points: npt.ArrayLike | Surface, session: Session) -> Self:
         self.check()
-        surface, left_out = fitted_rows(points)
+        surface, left_out = fitted_rows(surface_or_array(points))
         shape = checked_dimension(surface)
         parts = parts_of(surface, self.components)
         fitted = fitted_side_by_side(self.fit_part, parts, session)
@@ -178,7 +219,7 @@ class Estimator(ABC):
 
     def _known(self) -> Fitted:
         if "fitted_" not in vars(self):
-            raise InputError("this model is not fitted; call fit or load first")
+            raise NotFittedError("this model is not fitted; call fit or load first")
         return self.fitted_
 
     def transform(self, points: npt.ArrayLike | Surface) -> FloatArray:
@@ -197,6 +238,10 @@ class Estimator(ABC):
         uv = np.full((len(at), 2), np.nan)
         uv[~is_far] = fitted.flatten(at[~is_far])
         return uv
+
+    def fit_transform(self, points: npt.ArrayLike | Surface, y: None = None) -> FloatArray:
+        """Fit to points, and map the same ones; see `fit` and `transform`."""
+        return self.fit(points, y).transform(points)
 
     def inverse_transform(self, uv: npt.ArrayLike) -> FloatArray:
         """(N, 3) points on the surface at (N, 2) coordinates of `transform`.
@@ -258,9 +303,10 @@ class Estimator(ABC):
         model = dataclasses.replace(self, seed=seed)  # type: ignore[type-var]  # a subclass is a dataclass
         at = coordinates(surface, 3)
         model._fit(surface, Session(watched=at if len(at) <= MOST_WATCHED else None))  # noqa: SLF001 (a copy of this one)
-        uv = unmapped(surface, model.fitted_.flatten(at))
         if isinstance(surface, Mesh):
+            uv = model.fitted_.flatten(at)
             return Parameterization(uv, surface.faces, model.trace_, model.report_)
+        uv = unmapped(surface, model.transform(at))
         return PointParameterization(uv, model.trace_, model.report_)
 
     def save(self, folder: str | Path) -> None:
@@ -364,11 +410,15 @@ def coordinates(values: npt.ArrayLike | Surface, columns: int) -> FloatArray:
     Raises:
         InputError: the array has another shape, or a value is not finite.
     """
-    if isinstance(values, Mesh):
-        return values.vertices
-    if isinstance(values, PointCloud):
-        return values.points
-    array = np.asarray(values, dtype=np.float64)
+    given = surface_or_array(values)
+    if isinstance(given, Mesh):
+        return given.vertices
+    if isinstance(given, PointCloud):
+        return given.points
+    try:
+        array = given.astype(np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"coordinates must be numbers: {error}") from None
     if array.ndim != 2 or array.shape[1] != columns or not np.isfinite(array).all():
         raise InputError(f"coordinates must be finite and of shape (n, {columns})")
     return array

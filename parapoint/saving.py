@@ -14,6 +14,7 @@ import safetensors
 import safetensors.numpy
 
 from parapoint.errors import InputError
+from parapoint.files.targets import complete_file
 
 FORMAT = 5
 """Version of saved models and checkpoints."""
@@ -28,11 +29,10 @@ def write(folder: Path, stem: str, arrays: dict[str, np.ndarray], facts: dict[st
     old = _named_arrays(folder / f"{stem}.json")
     data = safetensors.numpy.save({k: np.asarray(of, order="C") for k, of in arrays.items()})
     name = f"{stem}-{_digest(data)}.safetensors"
-    text = json.dumps({"format": FORMAT, "tensors": name, **facts}, indent=1)
+    text = json.dumps({"format": FORMAT, "tensors": name, **facts}, indent=1, default=_plain)
     for path, content in ((folder / name, data), (folder / f"{stem}.json", text.encode())):
-        temporary = path.with_name(path.name + ".part")
-        temporary.write_bytes(content)
-        temporary.replace(path)
+        with complete_file(path) as file:
+            file.write(content)
     if old is not None and old.name != name:
         old.unlink(missing_ok=True)
 
@@ -120,3 +120,10 @@ def damage_of(folder: Path) -> Iterator[None]:
         if isinstance(error, InputError):
             raise
         raise InputError(f"{folder}: damaged, fit anew or delete it ({error})") from error
+
+
+def _plain(value: object) -> object:
+    """A number of NumPy as Python's, for JSON."""
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"{value!r} cannot be saved")

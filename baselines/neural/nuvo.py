@@ -13,7 +13,7 @@ from torch import Tensor, nn
 from baselines.neural.training import NeuralMethod, SurfaceTrainer
 from parapoint.learned import losses
 from parapoint.learned.networks import LeakyReLU, Stack, SurfaceNetworks
-from parapoint.learned.trainer import tangent_frames
+from parapoint.surfaces.normals import tangent_frames
 from parapoint.surfaces.surface import FloatArray
 
 HIDDEN = (256,) * 7

@@ -183,14 +183,18 @@ SUITES: dict[str, Suite] = {
         ),
         Suite(
             "ablation",
-            "The paper's ablation: distortion terms and branches",
-            ("cube_odedstein", "cylinder_cgal", "eight_cfwen"),
+            "The paper's ablation: distortion terms, branches, and each term left out",
+            ("cube_odedstein", "cylinder_cgal", "eight_cfwen", "hand_1_i_f5000"),
             (
                 PAPER,
                 ablated("distortion=isometric"),
                 ablated("branches='2d'"),
                 ablated("branches='3d'"),
                 ablated("distortion_weight=1e-4"),
+                ablated("distortion_weight=0"),
+                ablated("unwrap_weight=0"),
+                ablated("cycle_weight=0"),
+                ablated("anti_flip_weight=0"),
             ),
         ),
         Suite(
@@ -199,6 +203,12 @@ SUITES: dict[str, Suite] = {
             PAPER_CASES,
             (PAPER, LEARNED),
             (0, 1, 2, 3, 4),
+        ),
+        Suite(
+            "gpu",
+            "The paper's whole budget, 10,000 points and steps, on a GPU",
+            PAPER_CASES,
+            ("parapoint(preset=paper, device=cuda)",),
         ),
         Suite(
             "quality",

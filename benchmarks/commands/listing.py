@@ -111,7 +111,7 @@ def methods() -> Table:
         try:
             about = registry.describe(name)
         except (ImportError, InputError) as error:
-            _add(table, name, "", "", "", f"cannot be imported: {error}")
+            _add(table, name, "", "", "", str(error))
             continue
         parameters = ", ".join(f"{key}={value}" for key, value in about.parameters.items())
         requires = ", ".join(about.requires)

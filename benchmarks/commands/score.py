@@ -125,7 +125,8 @@ def summary(state: MapState) -> str:
     middle = float(np.median(distortion.quasi_conformal)) if len(distortion.faces) else np.inf
     faces, topology = len(state.mesh.faces), state.mesh.topology
     welded = f"; {state.welded:,} doubled vertices welded" if state.welded else ""
-    return f"{faces:,} faces, surface: {topology}{welded}; median σ1/σ2 {middle:.4g}"
+    sampled = "; overlaps estimated from a sample" if state.validity.overlaps.sampled else ""
+    return f"{faces:,} faces, surface: {topology}{welded}{sampled}; median σ1/σ2 {middle:.4g}"
 
 
 def tables(values: dict[str, float]) -> list[Table]:

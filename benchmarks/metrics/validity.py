@@ -144,6 +144,6 @@ def bijective(validity: Validity) -> float:
     sound = not (
         validity.flipped.any()
         or validity.triangles.degenerate_uv.any()
-        or validity.overlaps.pair_count
+        or validity.overlaps.overlapped.any()
     )
     return float(sound)

@@ -23,6 +23,8 @@ from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 SAME_PLACE = 1e-7
 """Two points are at one place if they are no farther apart than this share of the diagonal of their
 bounding box. Most writers compute in single precision, which rounds by about as much."""
+CROWD = 32
+"""Neighbours within the tolerance, on average, that `places` looks at one by one."""
 
 
 class Scored(NamedTuple):
@@ -86,7 +88,9 @@ def places(points: FloatArray, tolerance: float = 0.0) -> IntArray:
     Args:
         points: coordinates.
         tolerance: two points are at one place if none of their coordinates differ by more than
-            this, or if a chain of such points joins them.
+            this, or if a chain of such points joins them. Where more than `CROWD`
+            others are so near to a point on average, one point stands for those within half the
+            tolerance, and takes in what is within 1.5 of it.
     """
     order = np.lexsort(points.T)
     ordered = points[order] + 0.0  # no negative zeros
@@ -97,12 +101,15 @@ def places(points: FloatArray, tolerance: float = 0.0) -> IntArray:
     if tolerance <= 0:
         return place
     apart = ordered[is_new]
-    pairs = cKDTree(apart).query_pairs(tolerance, p=np.inf, output_type="ndarray")
-    if not len(pairs):
-        return place
+    tree, cell = cKDTree(apart), np.arange(len(apart))
+    if tree.count_neighbors(tree, tolerance, p=np.inf) > (CROWD + 1) * len(apart):
+        cell = places(np.floor((apart - apart.min(axis=0)) / (tolerance / 2)))
+        apart = apart[np.unique(cell, return_index=True)[1]]
+        tree, tolerance = cKDTree(apart), 1.5 * tolerance
+    pairs = tree.query_pairs(tolerance, p=np.inf, output_type="ndarray")
     links = sparse.coo_matrix((np.ones(len(pairs), bool), pairs.T), [len(apart)] * 2)
     joined = csgraph.connected_components(links, directed=False)[1]
-    return np.asarray(joined[place], dtype=np.int64)
+    return np.asarray(joined[cell[place]], dtype=np.int64)
 
 
 def same_place(points: FloatArray) -> float:

@@ -13,8 +13,9 @@ from parapoint.commands.output import TEXTURE, preview_target, target, write
 from parapoint.errors import InputError
 from parapoint.files.reading import Polygons, read_polygons
 from parapoint.parameters import check_choice
-from parapoint.surfaces.components import COMPONENTS, components
-from parapoint.textures.baking import check_size
+from parapoint.surfaces.components import COMPONENTS, components, largest_component
+from parapoint.textures.baking import MARGIN, check_size
+from parapoint.textures.placing import BORDER
 
 
 @click.command(no_args_is_help=True, options_metavar="[OPTIONS] --out FILE")
@@ -75,8 +76,10 @@ def unwrap(
     check_size(TEXTURE if texture is None else texture, margin or 0)
     picture = None if preview is None else preview_target(preview, out, surface, force=force)
     given = read_polygons(surface)
+    border = BORDER if margin is None else margin / (texture or TEXTURE)
     if isinstance(given, Polygons):
-        from parapoint.commands.unwrapping import Request, border_of, lines, unwrap_mesh
+        from parapoint.commands.mesh_output import mesh_output
+        from parapoint.commands.unwrapping import Request, lines, unwrap_mesh
         from parapoint.unwrapping.unwrap import Unwrap
 
         check_choice("components", settings["components"], COMPONENTS)
@@ -85,23 +88,26 @@ def unwrap(
         for option, given_value in grown.items():
             if seams is not None and given_value is not None:
                 raise InputError(f"{option} does not go with --seams, which are cut as they are")
-        request = Request(
+        method = Unwrap(
+            time_budget=settings["time_budget"],
+            price=Unwrap.price if seam_price is None else seam_price,
+            max_distortion=max_distortion,
+        )
+        mesh, chosen = given.mesh, None
+        if settings["components"] == "largest" and mesh.component_count > 1:
+            mesh, chosen = largest_component(mesh)
+        output = mesh_output(
+            given,
             surface,
             out,
-            texture or TEXTURE,
-            border_of(margin, texture or TEXTURE),
-            Unwrap(
-                time_budget=settings["time_budget"],
-                price=Unwrap.price if seam_price is None else seam_price,
-                max_distortion=max_distortion,
-            ),
-            settings["seed"],
-            seams,
-            settings["components"] == "largest",
-            per_vertex,
-            picture,
+            texture,
+            MARGIN if margin is None else margin,
+            chosen=chosen,
+            per_vertex=per_vertex,
         )
-        facts = unwrap_mesh(given, request)
+        output.check(force=force)
+        request = Request(method, border, settings["seed"], seams, picture)
+        facts = unwrap_mesh(mesh, request, output)
         print(json.dumps(facts) if as_json else lines(facts))
         return
     unused = {"--seams": seams, "--seam-price": seam_price, "--max-distortion": max_distortion}

@@ -19,9 +19,14 @@ from parapoint.estimator import Estimator
 from parapoint.fitting import Fitted, Progress, Session
 from parapoint.parameters import check_choice, check_whole
 from parapoint.surfaces.frame import Frame
-from parapoint.surfaces.sampling import FEWEST_POINTS, training_points, without_coincident
+from parapoint.surfaces.sampling import (
+    COINCIDENT,
+    FEWEST_POINTS,
+    training_points,
+    without_coincident,
+)
 from parapoint.surfaces.strays import named
-from parapoint.surfaces.surface import FloatArray, PointCloud, Surface, vertex_normals
+from parapoint.surfaces.surface import BoolArray, FloatArray, PointCloud, Surface, vertex_normals
 
 logger = logging.getLogger("parapoint")
 
@@ -35,7 +40,7 @@ DESCENDING = 0.8
 """Share of the time budget after which a map is improved no more."""
 
 
-@dataclass
+@dataclass(repr=False)
 class ComputedMap(Estimator):
     """A free-boundary UV map of a bare point cloud, computed without training.
 
@@ -124,7 +129,7 @@ class ComputedMap(Estimator):
             "cut_short": cut_short,
             "seconds": round(time.monotonic() - begun, 3),
         }
-        return Fitted(held, drawn.frame, drawn.points, (), report)
+        return Fitted(held, drawn.frame, _on_surface(drawn), (), report)
 
 
 class _Drawn(NamedTuple):
@@ -141,6 +146,15 @@ class _Drawn(NamedTuple):
     frame: Frame
     cloud: FloatArray
     flat: FlatMap
+
+
+def _on_surface(drawn: _Drawn) -> FloatArray:
+    """(n, 3) the drawn points but those that are not on the surface that was found."""
+    if len(drawn.flat.missed) == 0:
+        return drawn.points
+    missed = cKDTree(drawn.cloud[drawn.flat.missed])
+    is_on: BoolArray = missed.query(drawn.frame.inside(drawn.points))[0] > COINCIDENT
+    return drawn.points[is_on]
 
 
 def _rows_of(missing: FloatArray, frame: Frame, surface: Surface) -> str:

@@ -10,6 +10,7 @@ unless it is to be conformal at any cost, such that every part keeps its area
 from __future__ import annotations
 
 import math
+import time
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,6 +36,8 @@ LONELY = 6.0
 """Cost of a vertex most of whose edges cross the seam, in such edges' share."""
 SWEEPS = 10
 """Passes over the seam in the choice of sides."""
+SEAM_SHARE = 0.5
+"""Share of the time for a map after which its seams are led no farther."""
 LEAST_PART = 0.5
 """Share of the points that the triangulation must reach."""
 
@@ -123,8 +126,9 @@ def flattened(
     row[reached] = np.arange(len(reached))
     missed = rows[~mesh.referenced]
     mesh = Mesh(mesh.vertices[reached], row[mesh.faces])
+    begun = time.monotonic()
     try:
-        disk = seamed(mesh, distortion)
+        disk = seamed(mesh, distortion, begun + SEAM_SHARE * (deadline - begun))
         uv = bijective_map(disk, _layout(disk), deadline)
         disk, uv = parts_kept(disk, uv, distortion, deadline)
     except (RuntimeError, np.linalg.LinAlgError) as error:  # a singular factor, no bijection

@@ -1,9 +1,10 @@
 """A conformal map made to keep every part: longer seams, and angles given up where need be.
 
 A conformal map along short seams shrinks what sticks out, an ear or a finger, to almost nothing.
-The symmetric Dirichlet energy punishes that. It is brought down first, and the seam led on to where
-the map still starves the surface of area. From there the conformal energy is brought down again, as
-far as no part pays for it.
+Where seams that were led there (`parapoint.computed.seams`) do not help, or where areas are to be
+kept as angles are, the symmetric Dirichlet energy does: it punishes what is small. It is brought
+down first, and the seam led on to where the map still starves the surface of area. For a balanced
+map the conformal energy is then brought down again, as far as no part pays for it.
 """
 
 from __future__ import annotations

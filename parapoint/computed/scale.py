@@ -12,7 +12,7 @@ from scipy import sparse
 from scipy.optimize import minimize
 
 from parapoint.planar.embedding import factored
-from parapoint.surfaces.surface import FloatArray, Mesh
+from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 
 COTANGENTS = (0.02, 20.0)
 """Range of the edge weights of a Laplacian: positive, for the maximum principle."""
@@ -56,6 +56,30 @@ def turning(mesh: Mesh, scale: FloatArray) -> FloatArray:
     return np.array([bend[loop].sum() for loop in mesh.boundary_loops])
 
 
+class _InnerLaplacian:
+    """The Laplacian of a mesh, factored where values at the boundary are given.
+
+    Attributes:
+        matrix: (V, V), of all vertices.
+        inside: (I,) the vertices off the boundary.
+    """
+
+    def __init__(self, mesh: Mesh) -> None:
+        boundary = np.concatenate(mesh.boundary_loops)
+        self.matrix = laplacian(mesh)
+        self.inside: IntArray = np.setdiff1d(np.arange(len(mesh.vertices)), boundary)
+        self._rows = self.matrix[self.inside]
+        self._factor = factored(self._rows[:, self.inside]) if len(self.inside) else None
+
+    def solved(self, right: FloatArray) -> FloatArray:
+        """(I, ...) the values inside whose Laplacian is `right`, (I, ...)."""
+        return right if self._factor is None else np.asarray(self._factor.solve(right))
+
+    def pull(self, vertices: IntArray, values: FloatArray) -> FloatArray:
+        """(I, ...) what values at some vertices of the boundary ask of those inside."""
+        return np.asarray(-(self._rows[:, vertices] @ values))
+
+
 def log_scale(mesh: Mesh, *, flat_loops: bool = True) -> FloatArray:
     """(V,) log scale of the conformal map of a planar domain that distorts area least.
 
@@ -64,14 +88,10 @@ def log_scale(mesh: Mesh, *, flat_loops: bool = True) -> FloatArray:
     loop turns by −2π, as in the plane.
     """
     loops = mesh.boundary_loops
-    boundary = np.concatenate(loops)
-    inside = np.setdiff1d(np.arange(len(mesh.vertices)), boundary)
+    inner_laplacian = _InnerLaplacian(mesh)
+    inside, boundary = inner_laplacian.inside, np.concatenate(loops)
     scale = np.zeros(len(mesh.vertices))
-    if len(inside) == 0:
-        return scale
-    matrix = laplacian(mesh)
-    factor = factored(matrix[inside][:, inside])
-    scale[inside] = factor.solve(-_curvature(mesh)[inside])
+    scale[inside] = inner_laplacian.solved(-_curvature(mesh)[inside])
     if not flat_loops or len(loops) == 1:
         return scale
     turns = turning(mesh, scale)
@@ -79,8 +99,8 @@ def log_scale(mesh: Mesh, *, flat_loops: bool = True) -> FloatArray:
     unit = np.zeros((len(scale), len(inner)))
     for column, loop in enumerate(inner):
         unit[loops[loop], column] = 1
-    unit[inside] = factor.solve(-(matrix[inside][:, boundary] @ unit[boundary]))
-    flux = matrix @ unit
+    unit[inside] = inner_laplacian.solved(inner_laplacian.pull(boundary, unit[boundary]))
+    flux = inner_laplacian.matrix @ unit
     response = np.array([flux[loops[loop]].sum(axis=0) for loop in inner])
     return np.asarray(scale + unit @ np.linalg.solve(response, -2 * np.pi - turns[inner]))
 
@@ -91,17 +111,16 @@ def even_scale(mesh: Mesh) -> FloatArray:
     Beginning with u = 0 on the boundary, its values there are moved by WAVES waves of arc length.
     """
     (loop,) = mesh.boundary_loops
-    inside = np.setdiff1d(np.arange(len(mesh.vertices)), loop)
-    scale = log_scale(mesh)
+    inner_laplacian = _InnerLaplacian(mesh)
+    inside = inner_laplacian.inside
+    scale = np.zeros(len(mesh.vertices))
+    scale[inside] = inner_laplacian.solved(-_curvature(mesh)[inside])
     sides = np.linalg.norm(mesh.vertices[np.roll(loop, -1)] - mesh.vertices[loop], axis=1)
     place = 2 * np.pi * (np.cumsum(sides) - sides) / sides.sum()
     phase = place[:, None] * np.arange(1, min(WAVES, len(loop) // 4) + 1)
     waves = np.zeros((len(scale), 2 * phase.shape[1]))
     waves[loop] = np.concatenate([np.cos(phase), np.sin(phase)], axis=1)
-    matrix = laplacian(mesh)
-    if len(inside):
-        pull = -(matrix[inside][:, loop] @ waves[loop])
-        waves[inside] = factored(matrix[inside][:, inside]).solve(pull)
+    waves[inside] = inner_laplacian.solved(inner_laplacian.pull(loop, waves[loop]))
     of_face = waves[mesh.faces].mean(axis=1)
     given, area = scale[mesh.faces].mean(axis=1), mesh.face_areas / mesh.face_areas.sum()
 

@@ -8,6 +8,8 @@ area they lead on to what the map would starve.
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -19,7 +21,7 @@ from parapoint.computed.scale import area_discrepancy, even_scale, log_scale, ma
 from parapoint.planar.embedding import embeddable, few_edges_graph, path_edges
 from parapoint.surfaces.areas import STARVED
 from parapoint.surfaces.cutting import cut_along, cut_to_disk
-from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh
+from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
 
 AREA_DISCREPANCY = 0.6
 """Cuts are added until the predicted total area discrepancy, of 2, is this small."""
@@ -37,24 +39,31 @@ TRIALS = 6
 """Times that no cut helps before what is starved is given up."""
 
 
-class Branch(NamedTuple):
-    """A cut from the boundary of a mesh to a tip.
+class Prediction(NamedTuple):
+    """What the scale of a planar domain's flat map tells.
 
     Attributes:
-        cut: the mesh after it.
-        gain: what it brings for each of its edges.
+        mesh: the domain.
+        wanted: (V,) how much a cut is wanted to each vertex, for each unit of its distance from the
+            boundary.
+        fault: what cuts are to bring down.
+        is_good: whether they have.
     """
 
-    cut: Mesh
-    gain: float
+    mesh: Mesh
+    wanted: FloatArray
+    fault: float
+    is_good: bool
 
 
-def seamed(mesh: Mesh, distortion: Distortion = "conformal") -> Mesh:
+def seamed(mesh: Mesh, distortion: Distortion = "conformal", deadline: float = math.inf) -> Mesh:
     """The mesh cut to a planar domain whose flat map has the scale that is asked for.
 
     Args:
         mesh: connected, manifold, oriented.
-        distortion: "conformal" cuts for an even scale alone, the others feed every part, too.
+        distortion: all are cut for an even scale; "balanced" is cut on to what a conformal map
+            starves, and so keeps both angles and parts.
+        deadline: no part is fed after this time of `time.monotonic`.
     """
     share = OPEN_SEAM if mesh.boundary_loops else CLOSED_SEAM
     budget = int(share * len(mesh.faces))
@@ -63,8 +72,8 @@ def seamed(mesh: Mesh, distortion: Distortion = "conformal") -> Mesh:
         opened = cut_to_disk(mesh)
     opened = joined_loops(opened)
     opened = evened(opened, budget - (len(opened.vertices) - len(mesh.vertices)))
-    if distortion != "conformal":
-        opened = fed(opened)
+    if distortion == "balanced":
+        opened = fed(opened, deadline)
     return embeddable(opened)
 
 
@@ -90,100 +99,100 @@ def joined_loops(mesh: Mesh) -> Mesh:
 
 
 def evened(mesh: Mesh, budget: int) -> Mesh:
-    """The planar domain cut to where the scale is most extreme, until it is even enough.
-
-    Extreme is what is far from the boundary and in its log scale from the mean area's.
-
-    Args:
-        mesh: the domain.
-        budget: edges of all these cuts at most.
-    """
-
-    def discrepancy(of: Mesh) -> float:
-        return area_discrepancy(of, log_scale(of))
-
-    area = mesh.face_areas.sum()
-    while discrepancy(mesh) > AREA_DISCREPANCY:
-        scale = log_scale(mesh)
-        extreme = np.abs(scale - np.log(mapped_areas(mesh, scale).sum() / area) / 2)
-        branch, _ = _best_branch(mesh, extreme, discrepancy, budget)
-        if branch is None or branch.gain <= 0:
-            break
-        budget -= len(branch.cut.vertices) - len(mesh.vertices)
-        mesh = branch.cut
-    return mesh
+    """The planar domain cut to where its scale is most extreme, by at most `budget` edges."""
+    return _led(mesh, _evenness, trials=1, budget=budget)
 
 
-def fed(mesh: Mesh) -> Mesh:
-    """The planar domain cut to what its flat map would starve of area, until that is little."""
-    failed = 0
-    given_up: BoolArray = np.zeros(len(mesh.vertices), dtype=bool)
-    while failed < TRIALS and _predicted_starved(mesh) > PREDICTED_STARVED:
-        lacks = np.zeros(len(mesh.vertices))
-        np.maximum.at(lacks, mesh.faces.reshape(-1), np.repeat(_lacks(mesh), 3))
-        branch, tried = _best_branch(mesh, np.where(given_up, 0.0, lacks), _mean_lack)
-        if branch is None:
-            break
-        if branch.gain > 0:
-            mesh, failed = branch.cut, 0
-            given_up = np.zeros(len(mesh.vertices), dtype=bool)
-        else:
-            given_up, failed = given_up | tried, failed + 1
-    return mesh
+def fed(mesh: Mesh, deadline: float = math.inf) -> Mesh:
+    """The planar domain cut to what its flat map would starve of area, as far as that helps."""
+    return _led(mesh, _starvation, trials=TRIALS, deadline=deadline)
 
 
-def _best_branch(
-    mesh: Mesh, wanted: FloatArray, fault: Callable[[Mesh], float], budget: float = np.inf
-) -> tuple[Branch | None, BoolArray]:
-    """The cut that gains most for each edge, and (V,) what lies around the tips that were tried.
+def _led(
+    mesh: Mesh,
+    predict: Callable[[Mesh], Prediction],
+    *,
+    trials: int,
+    budget: float = math.inf,
+    deadline: float = math.inf,
+) -> Mesh:
+    """The domain after cuts to where they are wanted, until it is good or no cut helps.
+
+    Of some tips the one whose cut gains most for each edge is taken.
 
     Args:
         mesh: a planar domain.
-        wanted: (V,) times the distance from the boundary: where the tips are sought.
-        fault: what a gain is the fall of.
-        budget: edges of the cut at most.
+        predict: what is wanted where.
+        trials: times in a row that no cut may help before the rest is given up.
+        budget: edges of all cuts at most.
+        deadline: no cut is sought after this time of `time.monotonic`.
     """
-    graph = few_edges_graph(mesh)
+    now, failed = predict(mesh), 0
+    given_up: BoolArray = np.zeros(len(mesh.vertices), dtype=bool)
+    while failed < trials and not now.is_good and time.monotonic() < deadline:
+        tips, around = _branches(now, given_up)
+        longer = [
+            (predict(cut_along(now.mesh, path)), len(path)) for path in tips if len(path) <= budget
+        ]
+        gains = [(now.fault - cut.fault) / length for cut, length in longer]
+        if not gains:
+            break
+        best = int(np.argmax(gains))
+        if gains[best] > 0:
+            now, length = longer[best]
+            budget, failed = budget - length, 0
+            given_up = np.zeros(len(now.mesh.vertices), dtype=bool)
+        else:
+            given_up, failed = around, failed + 1
+    return now.mesh
+
+
+def _branches(now: Prediction, given_up: BoolArray) -> tuple[list[IntArray], BoolArray]:
+    """Edges (n, 2) of paths from the boundary to at most TIPS tips, and (V,) what is near those.
+
+    Tips are where the wish for a cut, times the distance, is greatest; none is near another, nor
+    among what was given up (V,), which is returned with the rest.
+    """
+    graph = few_edges_graph(now.mesh)
     distance, previous, _ = csgraph.dijkstra(
         graph,
-        indices=np.concatenate(mesh.boundary_loops),
+        indices=np.concatenate(now.mesh.boundary_loops),
         return_predecessors=True,
         min_only=True,
     )
-    before, best = fault(mesh), None
-    tried: BoolArray = np.zeros(len(wanted), dtype=bool)
+    paths = []
     for _ in range(TIPS):
-        want = np.where(tried, 0.0, wanted * distance)
+        want = np.where(given_up, 0.0, now.wanted * distance)
         tip = int(want.argmax())
         if want[tip] == 0:
             break
-        tried |= np.isfinite(csgraph.dijkstra(graph, indices=tip, limit=distance[tip] / 2))
-        path = path_edges(previous, tip)
-        if len(path) <= budget:
-            cut = cut_along(mesh, path)
-            branch = Branch(cut, (before - fault(cut)) / len(path))
-            best = branch if best is None or branch.gain > best.gain else best
-    return best, tried
+        paths.append(path_edges(previous, tip))
+        near = csgraph.dijkstra(graph, indices=tip, limit=distance[tip] / 2)
+        given_up = given_up | np.isfinite(near)
+    return paths, given_up
 
 
-def _predicted_ratios(mesh: Mesh) -> FloatArray:
-    """(F,) each face's share of the flat map's area over its share of the surface, predicted."""
+def _evenness(mesh: Mesh) -> Prediction:
+    """Cuts are wanted where the scale is far from that of the mean area."""
+    scale = log_scale(mesh)
+    middle = np.log(mapped_areas(mesh, scale).sum() / mesh.face_areas.sum()) / 2
+    discrepancy = area_discrepancy(mesh, scale)
+    return Prediction(mesh, np.abs(scale - middle), discrepancy, discrepancy <= AREA_DISCREPANCY)
+
+
+def _starvation(mesh: Mesh) -> Prediction:
+    """Cuts are wanted where a face has less than FED of its fair area, by the ratio's logarithm."""
+    area = mesh.face_areas / mesh.face_areas.sum()
+    ratios = _fair_ratios(mesh)
+    lacks = np.log(FED / np.clip(ratios, 1e-12, FED))
+    wanted = np.zeros(len(mesh.vertices))
+    np.maximum.at(wanted, mesh.faces.reshape(-1), np.repeat(lacks, 3))
+    starved = float(area[ratios < STARVED].sum())
+    return Prediction(mesh, wanted, float(area @ lacks), starved <= PREDICTED_STARVED)
+
+
+def _fair_ratios(mesh: Mesh) -> FloatArray:
+    """(F,) predicted share of each face in the map's area over its share of the surface."""
     is_disk = len(mesh.boundary_loops) == 1
     mapped = mapped_areas(mesh, even_scale(mesh) if is_disk else log_scale(mesh))
     return np.asarray(mapped / mapped.sum() * mesh.face_areas.sum() / mesh.face_areas)
-
-
-def _predicted_starved(mesh: Mesh) -> float:
-    """The share of the surface that the flat map will starve."""
-    area = mesh.face_areas
-    return float(area[_predicted_ratios(mesh) < STARVED].sum() / area.sum())
-
-
-def _lacks(mesh: Mesh) -> FloatArray:
-    """(F,) how far each face is below FED of its fair area, as a logarithm; 0 where it is not."""
-    return np.asarray(np.log(FED / np.clip(_predicted_ratios(mesh), 1e-12, FED)))
-
-
-def _mean_lack(mesh: Mesh) -> float:
-    """The mean of `_lacks` over the area."""
-    return float(_lacks(mesh) @ mesh.face_areas / mesh.face_areas.sum())

@@ -10,10 +10,11 @@ import json
 import struct
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import unquote
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from parapoint.errors import InputError
@@ -25,11 +26,11 @@ from parapoint.files.content import (
     welded,
     whole,
 )
-from parapoint.files.decoding import check_decoded
+from parapoint.files.decoding import check_decoded, plain
 from parapoint.surfaces.surface import FloatArray, IntArray
 
 GLTF_TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-GLTF_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+GLTF_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 UNDERSTOOD = {"KHR_mesh_quantization", "KHR_texture_transform", "EXT_mesh_gpu_instancing"}
 """Extensions that are read where a file requires them."""
 APPEARANCE = ("KHR_materials_", "KHR_lights_", "KHR_texture_basisu", "EXT_texture_", "KHR_xmp")
@@ -37,6 +38,31 @@ APPEARANCE = ("KHR_materials_", "KHR_lights_", "KHR_texture_basisu", "EXT_textur
 
 
 def glb(data: bytes, folder: Path) -> Content:
+    """The content of binary glTF 2; see `gltf`."""
+    return _of_glb(data, folder).content()
+
+
+def gltf(data: bytes, folder: Path) -> Content:
+    """The triangles (or, without any, the points) of a glTF 2 scene, moved to their places.
+
+    glTF splits a vertex wherever a normal or a UV differs, so vertices are welded where their
+    positions are exactly equal: seams of the UV are seams, not boundaries of the mesh. The UV are
+    those of the first set, with v upwards as in OBJ.
+    """
+    return _of_text(data, folder).content()
+
+
+def opened(path: Path) -> Gltf:
+    """The scene in a .glb or .gltf file.
+
+    Raises:
+        InputError, ValueError, KeyError, IndexError, struct.error, TypeError: it is no such file.
+    """
+    of = _of_glb if path.suffix.lower() == ".glb" else _of_text
+    return of(plain(path.read_bytes()), path.parent)
+
+
+def _of_glb(data: bytes, folder: Path) -> Gltf:
     """Binary glTF 2: a header and two chunks, JSON and data."""
     magic, version, _ = struct.unpack_from("<4sII", data)
     if magic != b"glTF" or version != 2:
@@ -49,21 +75,37 @@ def glb(data: bytes, folder: Path) -> Content:
     if len(tail) >= 8:
         size, _ = struct.unpack_from("<I4s", tail)
         chunk = tail[8 : 8 + size]
-    return gltf(data[20 : 20 + length], folder, chunk)
+    return _of_text(data[20 : 20 + length], folder, chunk)
 
 
-def gltf(data: bytes, folder: Path, chunk: bytes = b"") -> Content:
-    """The triangles (or, without any, the points) of a glTF 2 scene, moved to their places.
+def _of_text(data: bytes, folder: Path, chunk: bytes = b"") -> Gltf:
+    return Gltf(json.loads(data), folder, chunk, len(data) + len(chunk))
 
-    glTF splits a vertex wherever a normal or a UV differs, so vertices are welded where their
-    positions are exactly equal: seams of the UV are seams, not boundaries of the mesh. The UV are
-    those of the first set, with v upwards as in OBJ.
+
+class Placed(NamedTuple):
+    """A primitive where a node of the scene puts it.
+
+    Attributes:
+        primitive: as the file has it.
+        transform: (4, 4) of the node.
+        weights: of its morph targets.
+        skin: number of the skin whose joints move its vertices, or None.
+        node: the node; None in a file without any.
     """
-    return _Gltf(json.loads(data), folder, chunk, len(data) + len(chunk)).content()
+
+    primitive: dict[str, Any]
+    transform: FloatArray
+    weights: list[float]
+    skin: int | None
+    node: dict[str, Any] | None = None
 
 
-class _Gltf:
-    """One glTF file while it is read."""
+class Gltf:
+    """One glTF file while it is read.
+
+    Attributes:
+        tree: its JSON.
+    """
 
     def __init__(self, tree: Any, folder: Path, chunk: bytes, size: int) -> None:
         if not isinstance(tree, dict) or not tree.get("meshes"):
@@ -77,8 +119,9 @@ class _Gltf:
             raise InputError(f"needs {unknown[0]}, which is not read; export it without")
         self.tree, self.folder, self.chunk, self.size = tree, folder, chunk, size
         self.buffers: dict[str | int, bytes] = {}
+        self.world: dict[int, FloatArray] = {}  # (4, 4) transform of each node in the scene
 
-    def _buffer(self, index: int) -> bytes:
+    def buffer(self, index: int) -> bytes:
         """The bytes of a buffer, read once: the file's own chunk, in the text, or a file beside."""
         uri = self.tree["buffers"][index].get("uri")
         key = index if uri is None else uri
@@ -96,39 +139,83 @@ class _Gltf:
             return base64.b64decode(uri.partition(",")[2])
         path = (folder / unquote(uri)).resolve()
         if not path.is_relative_to(folder.resolve()) or not path.is_file():
-            raise InputError(f"its buffer {uri[:80]!r} is not a file beside it")
+            raise InputError(f"{uri[:80]!r} is not a file beside it")
         data = path.read_bytes()
         self.size += len(data)
         return data
 
+    def image(self, index: int) -> bytes:
+        """The bytes of an image file: a piece of a buffer, in the text, or a file beside."""
+        item = self.tree["images"][index]
+        if "bufferView" in item:
+            view = self.tree["bufferViews"][item["bufferView"]]
+            start = view.get("byteOffset", 0)
+            return self.buffer(view["buffer"])[start : start + view["byteLength"]]
+        return self._loaded(1, item["uri"])
+
+    def triangles(self, primitive: dict[str, Any]) -> IntArray:
+        """(F, 3) rows of the vertices of a primitive of mode 4, 5 or 6."""
+        if "indices" in primitive:
+            run = whole(self.accessor(primitive["indices"])).reshape(-1)
+        else:
+            run = np.arange(self.tree["accessors"][primitive["attributes"]["POSITION"]]["count"])
+        return _mode_triangles(primitive.get("mode", 4), run)
+
     def accessor(self, index: int) -> FloatArray | IntArray:
         """(n, width) values; normalized whole numbers become fractions."""
+        array = self.stored(index)
+        if array.dtype.kind == "f":
+            return array.astype(np.float64)
+        if self.tree["accessors"][index].get("normalized"):
+            return np.maximum(array / float(np.iinfo(array.dtype).max), -1.0)
+        return array.astype(np.int64)
+
+    def stored(self, index: int) -> npt.NDArray[Any]:
+        """(n, width) values of an accessor as they are stored."""
         item = self.tree["accessors"][index]
-        if "sparse" in item or "bufferView" not in item:
-            raise InputError("has sparse or compressed data, which is not read; export it plain")
-        view = self.tree["bufferViews"][item["bufferView"]]
-        kind = np.dtype(GLTF_TYPES[item["componentType"]])
         width = GLTF_WIDTHS[item["type"]]
+        if item["count"] < 1:
+            raise InputError("has an accessor of impossible size")
+        if "bufferView" in item:
+            array = self._view(item, item["componentType"], item["count"], width)
+        elif "sparse" not in item:
+            raise InputError("has compressed data, which is not read; export it plain")
+        else:  # zeros, of which some are replaced
+            check_decoded(8 * width * item["count"], self.size)
+            array = np.zeros((item["count"], width), GLTF_TYPES[item["componentType"]])
+        if sparse := item.get("sparse"):
+            indices, values = sparse["indices"], sparse["values"]
+            rows = self._view(indices, indices["componentType"], sparse["count"], 1)[:, 0]
+            if rows.max() >= len(array):
+                raise InputError("has a sparse accessor with an index out of range")
+            array = array.copy()
+            array[rows] = self._view(values, item["componentType"], sparse["count"], width)
+        return array
+
+    def _view(
+        self, item: dict[str, Any], component: int, count: int, width: int
+    ) -> npt.NDArray[Any]:
+        """(count, width) values as they lie in a buffer view, from the byte that `item` says."""
+        view = self.tree["bufferViews"][item["bufferView"]]
+        kind = np.dtype(GLTF_TYPES[component])
         stride = view.get("byteStride", width * kind.itemsize)
         start = view.get("byteOffset", 0) + item.get("byteOffset", 0)
-        raw = self._buffer(view["buffer"])
-        count = item["count"]
+        raw = self.buffer(view["buffer"])
         if count < 1 or start < 0 or stride < width * kind.itemsize:
             raise InputError("has an accessor of impossible size")
         if start + (count - 1) * stride + width * kind.itemsize > len(raw):
             raise InputError("ends early, in a buffer")
-        array = np.ndarray((count, width), kind, raw, start, (stride, kind.itemsize))
-        if kind.kind == "f":
-            return array.astype(np.float64)
-        if item.get("normalized"):
-            return np.maximum(array / float(np.iinfo(kind).max), -1.0)
-        return array.astype(np.int64)
+        return np.ndarray((count, width), kind, raw, start, (stride, kind.itemsize))
 
-    def placed_primitives(self) -> list[tuple[dict[str, Any], FloatArray]]:
-        """Each primitive of the scene with its (4, 4) transform."""
+    def placed_primitives(self) -> list[Placed]:
+        """The primitives of the scene, in order."""
         nodes = self.tree.get("nodes", [])
         if not nodes:
-            return [(p, np.eye(4)) for mesh in self.tree["meshes"] for p in mesh["primitives"]]
+            return [
+                Placed(primitive, np.eye(4), mesh.get("weights", []), None)
+                for mesh in self.tree["meshes"]
+                for primitive in mesh["primitives"]
+            ]
         scenes = self.tree.get("scenes", [])
         children = {child for node in nodes for child in node.get("children", [])}
         roots = (
@@ -136,7 +223,7 @@ class _Gltf:
             if scenes
             else [index for index in range(len(nodes)) if index not in children]
         )
-        placed: list[tuple[dict[str, Any], FloatArray]] = []
+        placed: list[Placed] = []
         waiting = [(index, np.eye(4)) for index in reversed(roots)]
         visited: set[int] = set()  # nodes form trees; a file in which they do not must not hang
         while waiting:
@@ -145,12 +232,18 @@ class _Gltf:
                 raise InputError("has a node that hangs in two places")
             visited.add(index)
             node = nodes[index]
-            transform = outer @ _node_transform(node)
+            transform = self.world[index] = outer @ _node_transform(node)
             if "mesh" in node:
-                primitives = self.tree["meshes"][node["mesh"]]["primitives"]
+                mesh = self.tree["meshes"][node["mesh"]]
+                primitives = mesh["primitives"]
+                weights = node.get("weights", mesh.get("weights", []))
                 places = [transform @ local for local in self._instances(node)]
                 check_decoded(128 * (len(placed) + len(places) * len(primitives)), self.size)
-                placed += [(primitive, place) for place in places for primitive in primitives]
+                placed += [
+                    Placed(primitive, place, weights, node.get("skin"), node)
+                    for place in places
+                    for primitive in primitives
+                ]
             waiting += [(child, transform) for child in reversed(node.get("children", []))]
         return placed
 
@@ -169,6 +262,30 @@ class _Gltf:
             raise InputError("has instances without a number of their own")
         rows = zip(*given.values(), strict=True)
         return [_node_transform(dict(zip(given, row, strict=True))) for row in rows]
+
+    def _positions(self, placed: Placed) -> FloatArray:
+        """(n, 3) the vertices of a primitive as the file poses them: morphed, skinned, in place."""
+        attributes, transform = placed.primitive["attributes"], placed.transform
+        local = np.asarray(self.accessor(attributes["POSITION"]), dtype=np.float64)
+        targets = placed.primitive.get("targets", [])
+        for share, target in zip(placed.weights, targets, strict=False):
+            if share and "POSITION" in target:
+                local = local + share * self.accessor(target["POSITION"])
+        if not np.isfinite(local).all():
+            raise InputError("has a position that is not finite")
+        if placed.skin is None or "JOINTS_0" not in attributes:
+            return np.asarray(local @ transform[:3, :3].T + transform[:3, 3])
+        skin = self.tree["skins"][placed.skin]  # its joints move the vertices, and not the node
+        joints = np.stack([self.world[joint] for joint in skin["joints"]])
+        if "inverseBindMatrices" in skin:
+            bound = self.accessor(skin["inverseBindMatrices"]).reshape(-1, 4, 4)
+            joints = joints @ bound.transpose(0, 2, 1)
+        weight = self.accessor(attributes["WEIGHTS_0"])
+        blended = np.einsum(
+            "nj,njkl->nkl", weight, joints[whole(self.accessor(attributes["JOINTS_0"]))]
+        )
+        moved = np.einsum("nkl,nl->nk", blended[:, :3, :3], local) + blended[:, :3, 3]
+        return np.asarray(moved, dtype=np.float64)
 
     def _texture(self, primitive: dict[str, Any]) -> tuple[str, FloatArray]:
         """The UV set of a primitive's base colour, and its (2, 3) transform."""
@@ -192,23 +309,16 @@ class _Gltf:
         """The scene as one content."""
         positions, corners, uvs, uv_corners, points = [], [], [], [], []
         vertex_count = uv_count = decoded = 0
-        for primitive, transform in self.placed_primitives():
+        for placed in self.placed_primitives():
+            primitive, transform = placed.primitive, placed.transform
             attributes = primitive["attributes"]
-            local = self.accessor(attributes["POSITION"])
-            if not np.isfinite(local).all():
-                raise InputError("has a position that is not finite")
-            place = local @ transform[:3, :3].T + transform[:3, 3]
+            place = self._positions(placed)
             mode = primitive.get("mode", 4)
             if mode == 0:
                 points.append(place)
             if mode not in {4, 5, 6}:
                 continue
-            run = (
-                whole(self.accessor(primitive["indices"])).reshape(-1)
-                if "indices" in primitive
-                else np.arange(len(place))
-            )
-            turned = _mode_triangles(mode, run)
+            turned = self.triangles(primitive)
             if np.linalg.det(transform[:3, :3]) < 0:  # a mirror image turns the faces round
                 turned = turned[:, ::-1]
             triangles = turned.reshape(-1)

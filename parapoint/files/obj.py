@@ -12,6 +12,7 @@ from parapoint.surfaces.surface import FloatArray, IntArray
 
 V, VT, F = (b"v ", b"v\t"), (b"vt ", b"vt\t"), (b"f ", b"f\t")
 FO = (b"fo ", b"fo\t")
+FREE_FORM = (b"surf ", b"surf\t", b"curv ", b"curv\t", b"curv2 ", b"curv2\t")
 """Beginnings of the lines that are read."""
 
 
@@ -23,6 +24,10 @@ def obj(data: bytes) -> Content:
     ]
     # "fo" is what faces with a border were called before 1993; they are faces as others.
     lines = [b"f" + line[2:] if line.startswith(FO) else line for line in lines]
+    if any(line.startswith(FREE_FORM) for line in lines) and not any(
+        line.startswith(F) for line in lines
+    ):
+        raise InputError("holds curves or free-form surfaces and no face; export it as a mesh")
     points, point_sizes = _rows([line[1:] for line in lines if line.startswith(V)])
     uvs, uv_sizes = _rows([line[2:] for line in lines if line.startswith(VT)])
     if len(point_sizes) and point_sizes.min() < 3:

@@ -6,12 +6,21 @@ from itertools import pairwise
 
 import mapbox_earcut
 import numpy as np
+import shapely
 
+from parapoint.errors import InputError
 from parapoint.files.content import ranges
-from parapoint.surfaces.surface import FloatArray, IntArray
+from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray
 
 THIN = 1e-9
 """Share of a polygon's area below which a triangle of its fan counts as folded or flat."""
+MOST_CORNERS = 20_000
+"""Corners that a polygon may have where no fan fills it: cutting it takes time by their square."""
+FEW_CORNERS = 64
+"""Corners up to which a polygon is cut in no time, whatever its shape."""
+MOST_STEPS = 4e9
+"""Steps, the cube of the corners each, that polygons may take which touch or cross themselves; the
+bridge to a hole touches."""
 
 
 def triangle_rows(vertices: FloatArray, sizes: IntArray, corners: IntArray) -> IntArray:
@@ -27,6 +36,9 @@ def triangle_rows(vertices: FloatArray, sizes: IntArray, corners: IntArray) -> I
         vertices: (V, 3) positions, finite.
         sizes: (N,) corners of each polygon, at least 3.
         corners: (sum of sizes,) rows of `vertices`.
+
+    Raises:
+        InputError: polygons are too large to be cut, or too large and cross themselves.
     """
     starts = np.cumsum(sizes) - sizes
     scale = float(np.abs(vertices).max(initial=0)) or 1.0  # products of huge coordinates overflow
@@ -42,19 +54,42 @@ def triangle_rows(vertices: FloatArray, sizes: IntArray, corners: IntArray) -> I
     start, shift, size = (np.repeat(values, count)[:, None] for values in (starts, turn, sizes))
     rows = np.asarray(start + (place + shift) % size)
     first_row = np.cumsum(count) - count
+    steps = 0.0
     for polygon in np.flatnonzero(sizes > 4).tolist():
         begin, n = int(starts[polygon]), int(sizes[polygon])
         ring = vertices[corners[begin : begin + n]] / scale
-        if (cut := ears(ring)) is not None:
+        if (plane := _plane(ring)) is None:
+            continue
+        steps += _steps(plane)
+        if n > MOST_CORNERS or steps > MOST_STEPS:
+            raise InputError(
+                f"face {polygon} has {n} corners, too many to be cut into triangles here"
+                + ("" if n > MOST_CORNERS else ", since it touches or crosses itself")
+                + "; cut it before"
+            )
+        if (cut := ears(plane)) is not None:
             rows[first_row[polygon] : first_row[polygon] + n - 2] = begin + cut
     return rows
 
 
-def ears(ring: FloatArray) -> IntArray | None:
-    """(n - 2, 3) rows of a polygon (n, 3) as triangles that turn as it does.
+def corner_rows(places: IntArray, rows: IntArray) -> tuple[IntArray, BoolArray]:
+    """(C,) the uv row at each corner of polygons, and (F,) the triangles that need others.
 
-    None where the fan from its first corner is right, or where no cut fills the polygon: it
-    crosses itself.
+    Where the seam runs through a polygon, some corners of its triangles have another row.
+
+    Args:
+        places: (F, 3) for each corner of the triangles, its place among the polygons' corners.
+        rows: (F, 3) its uv row.
+    """
+    row = np.full(int(places.max()) + 1, -1, dtype=np.int64)
+    row[places] = rows
+    return row, (row[places] != rows).any(axis=1)
+
+
+def _plane(ring: FloatArray) -> FloatArray | None:
+    """(n, 2) a polygon (n, 3) in its mean plane, counter-clockwise.
+
+    None where the fan from its first corner is right, or it has no area.
     """
     edges = ring[1:] - ring[0]
     fan = np.cross(edges[:-1], edges[1:])
@@ -64,10 +99,27 @@ def ears(ring: FloatArray) -> IntArray | None:
         return None
     drop = int(np.abs(normal).argmax())
     x, y = ((1, 2), (2, 0), (0, 1))[drop]
-    plane = (ring - ring[0])[:, [x, y]] * [1.0, np.sign(normal[drop])]
-    found = mapbox_earcut.triangulate_float64(plane, np.array([len(ring)], dtype=np.uint32))
-    triangles = _with_all_corners(np.asarray(found, dtype=np.int64).reshape(-1, 3), len(ring))
-    if len(triangles) != len(ring) - 2:
+    return np.asarray((ring - ring[0])[:, [x, y]] * [1.0, np.sign(normal[drop])])
+
+
+def _steps(plane: FloatArray) -> float:
+    """About how many steps it takes to cut a polygon (n, 2)."""
+    count = len(plane)
+    if count <= FEW_CORNERS or count > MOST_CORNERS:
+        return float(count) ** 2
+    if shapely.is_simple(shapely.linearrings(plane)):
+        return float(count) ** 2
+    return float(count) ** 3
+
+
+def ears(plane: FloatArray) -> IntArray | None:
+    """(n - 2, 3) rows of a polygon (n, 2) as triangles that turn as it does.
+
+    None where no cut fills the polygon: it crosses itself.
+    """
+    found = mapbox_earcut.triangulate_float64(plane, np.array([len(plane)], dtype=np.uint32))
+    triangles = _with_all_corners(np.asarray(found, dtype=np.int64).reshape(-1, 3), len(plane))
+    if len(triangles) != len(plane) - 2:
         return None
     a, b, c = plane[triangles].transpose(1, 0, 2)
     turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0

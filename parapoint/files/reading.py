@@ -14,9 +14,10 @@ import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from parapoint.errors import InputError
 from parapoint.files.content import NO_UV, Content
@@ -99,12 +100,18 @@ class Polygons(NamedTuple):
     Attributes:
         mesh: its triangles.
         places: (F, 3) for each corner of the triangles, its place among the polygons' corners.
+        polygon_of: (F,) the polygon that each triangle is part of.
         extras: what else the file holds, in words: what a writer of the mesh alone leaves out.
+        uv: (F, 3, 2) the UVs of the file at the corners, NaN where it has none; None without any.
+        colours: (V, 3 or 4) of the vertices, as `PointCloud` has them, or None.
     """
 
     mesh: Mesh
     places: IntArray
+    polygon_of: IntArray
     extras: tuple[str, ...]
+    uv: FloatArray | None = None
+    colours: npt.NDArray[Any] | None = None
 
 
 def read_polygons(path: str | Path) -> Polygons | PointCloud:
@@ -125,7 +132,10 @@ def read_polygons(path: str | Path) -> Polygons | PointCloud:
             "polygons" if (content.sizes > 3).any() else "",
             *content.attributes,
         ]
-        return Polygons(mesh, places, tuple(name for name in extras if name))
+        polygon_of = np.searchsorted(np.cumsum(content.sizes), places[:, 0], side="right")
+        named = tuple(name for name in extras if name)
+        colours = content.attributes.get("colours")
+        return Polygons(mesh, places, polygon_of, named, _corner_uv(content, places), colours)
 
 
 def read_parameterized(path: str | Path) -> tuple[Mesh, Parameterization]:
@@ -277,6 +287,17 @@ def _mesh(content: Content) -> tuple[Mesh, IntArray]:
         )
     rows = triangle_rows(vertices, content.sizes, content.corners)
     return Mesh(vertices, content.corners[rows]), rows
+
+
+def _corner_uv(content: Content, places: IntArray) -> FloatArray | None:
+    """(F, 3, 2) the UVs at corners, NaN where there is none; None where all lack one."""
+    if content.uv is None or content.uv_corners is None:
+        return None
+    rows = content.uv_corners[places]
+    known = (rows >= 0) & (rows < len(content.uv))
+    uv = np.full((*rows.shape, 2), np.nan)
+    uv[known] = content.uv[rows[known]]
+    return uv if known.any() else None
 
 
 def _shared_corners(mesh: Mesh, uv: FloatArray, corners: IntArray) -> IntArray:

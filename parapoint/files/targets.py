@@ -119,8 +119,20 @@ def complete_file(path: Path) -> Iterator[IO[bytes]]:
         with unfinished.open("xb") as file:
             yield file
         unfinished.replace(path)
+    except OSError as error:
+        # A full disk names no file, and nobody knows the name of the unfinished one.
+        if error.filename in (None, str(unfinished)):
+            error.filename, error.filename2 = str(path), None
+        raise
     finally:
-        unfinished.unlink(missing_ok=True)
+        with suppress(OSError):  # of a disk that has failed: what failed first is said
+            unfinished.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a whole text file in UTF-8, or nothing."""
+    with complete_file(path) as file:
+        file.write(text.encode("utf-8"))
 
 
 def _unfinished(path: Path) -> Path:

@@ -27,6 +27,13 @@ GROUPED_WHOLE = re.compile(rb"[+-]?\d{1,3}(?:,\d{3})+$")
 GROUPED_BY_POINTS = re.compile(rb"[+-]?\d{1,3}(?:\.\d{3})+,\d*$")
 """The same as it is written where the comma marks decimals; 1.234,5."""
 
+AXES = {
+    **dict.fromkeys(("easting", "east"), "x"),
+    **dict.fromkeys(("northing", "north"), "y"),
+    **dict.fromkeys(("elevation", "height", "altitude"), "z"),
+}
+"""What surveyors write over the columns of x, y and z."""
+
 
 def table(lines: list[bytes], columns: tuple[int, ...]) -> FloatArray:
     """(n, len(columns)) numbers in these columns of text lines; empty for no lines."""
@@ -96,42 +103,65 @@ def _marks_decimals(words: list[list[bytes]], with_comma: list[bytes]) -> bool:
     return False
 
 
-def point_lines(data: bytes) -> list[bytes]:
-    """Lines with numbers: without a heading, and without the counts before each scan.
+def point_lines(data: bytes) -> tuple[list[bytes], list[str]]:
+    """Lines with numbers, and the names of their columns, [] where none are given.
+
+    Left out are a heading, a line of units below it, and the counts before each scan.
 
     Raises:
-        InputError: there is none; see `text_lines`.
+        InputError: there is no point; see `text_lines`.
     """
     lines = [line for line in text_lines(data) if not line.strip().isdigit()]
-    if lines and not re.search(rb"\d", lines[0]):
-        lines = lines[1:]  # names of the columns
+    comment = data.lstrip().split(b"\n", 1)[0]
+    heading = comment if comment.startswith((b"#", b"//")) else b""
+    for _ in range(2):
+        if lines and not any(map(_is_number, lines[0].split())):
+            heading = heading if _names(heading) else lines[0]
+            lines = lines[1:]
     if not lines:
         raise InputError("has no point")
-    return lines
+    return lines, _names(heading)
+
+
+def _is_number(word: bytes) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _names(heading: bytes) -> list[str]:
+    """The names of columns in a line that has x, y and z among them; [] of any other line.
+
+    Units in brackets are left out; what surveyors call the axes is x, y and z.
+    """
+    text = re.sub(r"[\[(][^\])]*[\])]", "", heading.decode("latin-1").lower())
+    words = re.findall(r"[^\s,;\"]+", text.lstrip("#/ \t"))
+    names = [AXES.get(word, word) for word in words]
+    return names if {"x", "y", "z"} <= set(names) else []
 
 
 def xyz(data: bytes) -> Content:
     """Text with x y z in each line, and whatever columns a scanner adds; see `_further_columns`."""
-    lines = point_lines(data)
+    lines, names = point_lines(data)
     try:
         values = table(lines, tuple(range(len(lines[0].split()))))
     except ValueError:  # words, or not in all lines: the coordinates alone
         values = table(lines, (0, 1, 2))
     if values.shape[1] < 3:
         raise InputError("has fewer than three numbers in a line")
-    values = values[:, _coordinates_first(data, values)]
+    values = values[:, _coordinates_first(names, values)]
     return points_content(values[:, :3], *_further_columns(values))
 
 
-def _coordinates_first(data: bytes, values: FloatArray) -> list[int]:
-    """The columns in the order x, y, z and others, by the heading if it names them.
+def _coordinates_first(names: list[str], values: FloatArray) -> list[int]:
+    """The columns in the order x, y, z and others, by their names if all have one.
 
-    Without such a heading a first column that numbers the rows is left out, and a warning says so.
+    Without names a first column that numbers the rows is left out, and a warning says so.
     """
     columns = list(range(values.shape[1]))
-    heading = data.lstrip(b"#/ \t").split(b"\n", 1)[0].decode("latin-1").lower()
-    names = re.findall(r"[^\s,;\"]+", heading)
-    if len(names) == len(columns) and {"x", "y", "z"} <= set(names):
+    if len(names) == len(columns):
         at = [names.index(name) for name in "xyz"]
         return at + [column for column in columns if column not in at]
     number = values[:, 0]

@@ -188,6 +188,7 @@ LEARNED = Preset(
     features=64,
     gates=24,
     start="computed",
+    points=20_000,
     iterations=8_000,
     subset=384,
     all_from=1.0,

@@ -15,8 +15,8 @@ import numpy as np
 from scipy.sparse import csgraph
 
 from parapoint.computed.flattening import Flattened, flattened
-from parapoint.learned.trainer import tangents_of
 from parapoint.surfaces.cutting import edge_graph, edge_lengths
+from parapoint.surfaces.normals import tangents_of
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
 
 REACH = 0.15
@@ -66,7 +66,7 @@ def computed_start(points: FloatArray, gates: int, deadline: float = math.inf) -
     Raises:
         ReconstructionError: the points show no surface that can be followed and flattened.
     """
-    flat = flattened(points, deadline)
+    flat = flattened(points, deadline, "balanced")
     chosen = flat.chosen()
     gradients = flat.jacobians()[chosen].transpose(1, 0, 2)
     at = points[flat.rows]

@@ -47,7 +47,7 @@ def bijective_map(mesh: Mesh, layout: FloatArray | None, deadline: float = math.
         BijectionError: a face is flat, or in Tutte's embedding too small for numbers.
     """
     size = np.sqrt(mesh.face_areas.sum())
-    mesh, start = _embedded(mesh)
+    mesh, start = embedded(mesh)
     uv = start
     flat = None if layout is None else of_area_one(np.pad(layout, ((0, 0), (0, 1))), mesh.faces)
     if flat is not None and is_bijective(flat, flat.vertices[:, :2]):
@@ -62,17 +62,7 @@ def bijective_map(mesh: Mesh, layout: FloatArray | None, deadline: float = math.
     return np.asarray(size * uv)
 
 
-def isometric_map(mesh: Mesh) -> FloatArray:
-    """(V, 2) a bijective map of a connected planar domain of small symmetric Dirichlet energy.
-
-    Raises:
-        BijectionError: as of `bijective_map`.
-    """
-    size = np.sqrt(mesh.face_areas.sum())
-    return np.asarray(size * descended(*_embedded(mesh), igl.SYMMETRIC_DIRICHLET, EXACT))
-
-
-def _embedded(mesh: Mesh) -> tuple[Mesh, FloatArray]:
+def embedded(mesh: Mesh) -> tuple[Mesh, FloatArray]:
     """The mesh and Tutte's embedding (V, 2), both of area 1.
 
     Raises:

@@ -8,16 +8,16 @@ import time
 import igl
 import numpy as np
 
-from parapoint.planar.bijection import BijectionError, isometric_map
+from parapoint.planar.bijection import BijectionError, embedded
 from parapoint.planar.crossing import crossing_vertices
 from parapoint.planar.domains import FlatteningError, check_triangles
 from parapoint.planar.scaffold import (
     cut_opened,
     energy_densities,
+    free_steps_down,
     of_area_one,
     steps_down,
 )
-from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.cutting import cut_along, origin
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 
@@ -26,6 +26,8 @@ LEAST_ENERGY = 4.0
 """The energy of an isometry."""
 SETTLED = 1e-3
 """A map is at its best once a step lowers the energy's excess by less than this share of it."""
+REACH = 10
+"""An energy is in sight of a descent that would come there in so many steps like its last one."""
 
 
 class Run:
@@ -39,11 +41,13 @@ class Run:
         unit: sqrt(area).
         start: what it began with.
         branches: branches that the seam grew.
+        is_free: whether the boundary may cross itself; the map is then without flips, but perhaps
+            not one to one.
         deadline: `time.monotonic()` after which no step begins.
     """
 
-    def __init__(self, mesh: Mesh, deadline: float = math.inf) -> None:
-        self.mesh, self.deadline = mesh, deadline
+    def __init__(self, mesh: Mesh, deadline: float = math.inf, *, is_free: bool = False) -> None:
+        self.mesh, self.deadline, self.is_free = mesh, deadline, is_free
         self.unit = float(np.sqrt(mesh.face_areas.sum()))
         self.uv: FloatArray = np.zeros((0, 2))
         self.energy, self.start, self.branches = math.inf, "none", 0
@@ -53,24 +57,17 @@ class Run:
         """Whether the time is up."""
         return time.monotonic() > self.deadline
 
-    def begin(self, uv: FloatArray | None) -> None:
-        """Start from an isometric map or, if it is one to one and has less energy, from `uv`.
-
-        Args:
-            uv: (V, 2) another map, such as the computed one; it is brought to the mesh's scale.
+    def begin(self) -> None:
+        """Start from Tutte's embedding.
 
         Raises:
-            FlatteningError: the mesh has no isometric map to start from.
+            FlatteningError: it is too flat for numbers.
         """
         try:
-            self.take(isometric_map(self.mesh), "isometric")
+            _, uv = embedded(self.mesh)
         except BijectionError as error:
             raise FlatteningError(f"no start without flips was found: {error}") from None
-        if uv is None or (areas := signed_areas(uv, self.mesh.faces)).min() <= 0:
-            return
-        uv = uv * (self.unit / np.sqrt(areas.sum()))
-        if self.energy_of(uv) < self.energy and len(crossing_vertices(self.mesh, uv)) == 0:
-            self.take(uv, "computed")
+        self.take(self.unit * uv, "embedded")
 
     def take(self, uv: FloatArray, start: str) -> None:
         """Go on from a map (V, 2) that is one to one, in the scale of the mesh."""
@@ -88,10 +85,15 @@ class Run:
     def _densities(self, uv: FloatArray) -> FloatArray:
         return np.asarray(LEAST_ENERGY * energy_densities(self.mesh, uv, ENERGY))
 
-    def improve(self) -> None:
-        """Bring the energy down until the map has settled."""
+    def improve(self, goal: float = math.inf) -> None:
+        """Bring the energy down until the map has settled, or cannot be brought to a goal.
+
+        Args:
+            goal: an energy; the descent ends where so much is not in sight (REACH).
+        """
         unit = of_area_one(self.mesh.vertices, self.mesh.faces)
-        for moved in steps_down(unit, self.uv / self.unit, ENERGY, self.deadline):
+        down = free_steps_down if self.is_free else steps_down
+        for moved in down(unit, self.uv / self.unit, ENERGY, self.deadline):
             uv = self.unit * moved
             before, after = self.energy, self.energy_of(uv)
             if not after < before:
@@ -99,18 +101,50 @@ class Run:
             self.uv, self.energy = uv, after
             if before - after < SETTLED * (after - LEAST_ENERGY):
                 return
+            if after - goal > REACH * (before - after):
+                return
 
-    def cut(self, path: IntArray) -> Run | None:
-        """Another run whose seam is longer by a path of vertices (n,); None where that fails."""
+    def cut(self, path: IntArray, goal: float = math.inf) -> Run | None:
+        """Another run whose seam is longer by a path of vertices (n,); None where that fails.
+
+        Args:
+            path: from the seam or the boundary to a vertex inside.
+            goal: as of `improve`, for a free map.
+        """
         mesh = cut_along(self.mesh, np.stack([path[:-1], path[1:]], axis=1))
-        longer = Run(mesh, self.deadline)
-        uv = self.uv[origin(self.mesh, mesh)] / self.unit
-        moved = cut_opened(of_area_one(mesh.vertices, mesh.faces), uv, ENERGY, self.deadline)
+        longer = Run(mesh, self.deadline, is_free=self.is_free)
+        longer.branches = self.branches + 1
+        uv = self.uv[origin(self.mesh, mesh)]
+        if self.is_free:
+            longer.take(uv, self.start)
+            longer.improve(goal)
+            return longer
+        unit = of_area_one(mesh.vertices, mesh.faces)
+        moved = cut_opened(unit, uv / self.unit, ENERGY, self.deadline)
         if len(crossing_vertices(mesh, moved)):
             return None
         longer.take(self.unit * moved, self.start)
-        longer.branches = self.branches + 1
         return longer
+
+    def freed(self) -> Run:
+        """This map as a free one that has settled, in half of the time that is left."""
+        left = self.deadline - time.monotonic()
+        free = Run(self.mesh, time.monotonic() + left / 2, is_free=True)
+        free.take(self.uv, self.start)
+        free.branches = self.branches
+        free.improve()
+        return free
+
+    def held(self, deadline: float) -> Run | None:
+        """A map of the same domain, begun anew, that is one to one; None where that fails."""
+        held = Run(self.mesh, deadline)
+        try:
+            held.begin()
+        except FlatteningError:
+            return None
+        held.improve()
+        held.branches = self.branches
+        return held
 
     def report(self) -> dict[str, object]:
         """What stands beside the map."""

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.sparse import csgraph
 
 from parapoint.planar.descent import LEAST_ENERGY, Run
 from parapoint.surfaces.areas import MOST_STARVED, starved_faces, starved_share
 from parapoint.surfaces.cutting import edge_graph, edge_lengths, path_to
-from parapoint.surfaces.surface import BoolArray, FloatArray
+from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh
 
 PRICE = 1.0
 """What the symmetric Dirichlet energy (4 at least) must fall by for each sqrt(area) of seam, unless
@@ -23,6 +25,37 @@ LEAST_FALL = 0.01
 price."""
 
 
+@dataclass(frozen=True)
+class Need:
+    """What a seam is to bring.
+
+    Attributes:
+        price: what the energy must fall by for each sqrt(area) of seam.
+        most_starved: share of the surface that may be starved of area; above it more seam is
+            needed.
+        most_energy: above this energy more seam is needed.
+    """
+
+    price: float
+    most_starved: float
+    most_energy: float
+
+    def is_starved(self, run: Run) -> bool:
+        """Whether too much of the surface is starved of area."""
+        return starved_share(run.mesh, run.uv) > self.most_starved
+
+    def of(self, run: Run) -> bool:
+        """Whether more seam is needed at any price."""
+        return self.is_starved(run) or run.energy > self.most_energy
+
+    def least(self, run: Run, length: float) -> float:
+        """What the energy must fall by for a branch of a length in the unit of the mesh."""
+        paid = self.price * length / run.unit
+        if self.of(run):
+            return min(paid, LEAST_FALL * (run.energy - LEAST_ENERGY))
+        return paid
+
+
 def grown(
     run: Run,
     price: float,
@@ -32,69 +65,82 @@ def grown(
 ) -> Run:
     """The map after its seam was led on to where it is most distorted.
 
-    A branch stays where it pays, or where more seam is needed and it brings anything.
+    A branch stays where it pays, or where more seam is needed and it brings anything. Branches are
+    sought on a free map, where one that fails costs a few steps; a map along them that is one to
+    one is then begun anew, and stays if they pay together. Where they do not, or more seam is
+    needed still, branches of the map that is one to one open one by one, in many more steps.
 
     Args:
         run: the map, settled; it is left as it is.
-        price: what the energy must fall by for each sqrt(area) of seam.
-        most_starved: share of the surface that may be starved of area; above it more seam is
-            needed.
-        most_energy: above this energy more seam is needed.
+        price: see `Need`.
+        most_starved: see `Need`.
+        most_energy: see `Need`.
     """
-    failed, branches = 0, 0
-    blocked: BoolArray = np.zeros(len(run.mesh.vertices), dtype=bool)
-    while failed < TRIALS_IN_NEED and branches < MOST_BRANCHES and not run.is_late:
-        graph = edge_graph(run.mesh, edge_lengths(run.mesh))
-        distance, previous, _ = csgraph.dijkstra(
-            graph,
-            indices=np.concatenate(run.mesh.boundary_loops),
-            return_predecessors=True,
-            min_only=True,
-        )
-        is_starved = starved_share(run.mesh, run.uv) > most_starved
-        is_needed = is_starved or run.energy > most_energy
-        if failed >= TRIALS and not is_needed:
+    need = Need(price, most_starved, most_energy)
+    while not run.is_late:
+        free = _led_on(run.freed(), need)
+        if free.branches == run.branches and not need.of(run):
+            return run
+        if free.branches == run.branches:
             break
-        need = np.where(blocked, 0.0, _excess(run) * distance)
-        if is_starved:
-            need *= _around(run, starved_faces(run.mesh, run.uv))
-        tip = int(need.argmax())
-        if need[tip] == 0:
+        longer = free.held(run.deadline)
+        added = (_rim(free.mesh) - _rim(run.mesh)) / 2
+        if longer is None or not run.energy - longer.energy > need.least(run, added):
             break
-        least = price * float(distance[tip]) / run.unit
-        if is_needed:
-            least = min(least, LEAST_FALL * (run.energy - LEAST_ENERGY))
-        near = csgraph.dijkstra(graph, indices=tip, limit=float(distance[tip]))
-        longer = None
-        if _excess_within(run, np.isfinite(near)) > least:
-            longer = run.cut(np.array(path_to(previous, tip)))
-        if longer is not None and run.energy - longer.energy > least:
-            run = longer
-            failed, branches = 0, branches + 1
-            blocked = np.zeros(len(run.mesh.vertices), dtype=bool)
-        else:
-            failed += longer is not None
-            blocked |= near < float(distance[tip]) / 2
+        run = longer
+    return _led_on(run, need)
+
+
+def _led_on(run: Run, need: Need) -> Run:
+    """The map after branches were tried one after another, to where it is most distorted."""
+    while run.branches < MOST_BRANCHES and (longer := _longer(run, need)) is not None:
+        run = longer
     return run
 
 
-def _around(run: Run, faces: BoolArray) -> BoolArray:
+def _longer(run: Run, need: Need) -> Run | None:
+    """The map with one more branch; None where none is found."""
+    graph = edge_graph(run.mesh, edge_lengths(run.mesh))
+    rim = np.concatenate(run.mesh.boundary_loops)
+    distance, previous, _ = csgraph.dijkstra(
+        graph, indices=rim, return_predecessors=True, min_only=True
+    )
+    area = run.mesh.face_areas
+    excess = area / area.sum() * (run.densities() - LEAST_ENERGY)
+    worth = _mean_around(run.mesh, excess) * distance
+    if need.is_starved(run):
+        worth *= _corners(run.mesh, starved_faces(run.mesh, run.uv))
+    for _ in range(TRIALS_IN_NEED if need.of(run) else TRIALS):
+        while True:
+            tip = int(worth.argmax())
+            if worth[tip] <= 0 or run.is_late:
+                return None
+            least = need.least(run, float(distance[tip]))
+            near = csgraph.dijkstra(graph, indices=tip, limit=float(distance[tip]))
+            worth[near < float(distance[tip]) / 2] = 0
+            # No branch could gain more than all of the excess around.
+            if excess[np.isfinite(near)[run.mesh.faces].any(axis=1)].sum() > least:
+                break
+        longer = run.cut(np.array(path_to(previous, tip)), run.energy - least)
+        if longer is not None and run.energy - longer.energy > least:
+            return longer
+    return None
+
+
+def _rim(mesh: Mesh) -> float:
+    """Length of the boundary."""
+    return float(edge_lengths(mesh)[mesh.edge_face_count == 1].sum())
+
+
+def _corners(mesh: Mesh, faces: BoolArray) -> BoolArray:
     """(V,) the corners of some faces (F,)."""
-    corners: BoolArray = np.zeros(len(run.mesh.vertices), dtype=bool)
-    corners[run.mesh.faces[faces]] = True
+    corners: BoolArray = np.zeros(len(mesh.vertices), dtype=bool)
+    corners[mesh.faces[faces]] = True
     return corners
 
 
-def _excess(run: Run) -> FloatArray:
-    """(V,) mean energy above the least of the faces around each vertex, by area."""
-    weight = np.repeat(run.mesh.face_areas, 3)
-    rows = run.mesh.faces.reshape(-1)
-    excess = np.repeat(run.densities() - LEAST_ENERGY, 3)
-    return np.asarray(np.bincount(rows, weight * excess) / np.bincount(rows, weight))
-
-
-def _excess_within(run: Run, vertices: BoolArray) -> float:
-    """What faces at some vertices (V,) add to the energy's excess: all that a branch could gain."""
-    area = run.mesh.face_areas
-    inside = vertices[run.mesh.faces].any(axis=1)
-    return float(area[inside] @ (run.densities()[inside] - LEAST_ENERGY) / area.sum())
+def _mean_around(mesh: Mesh, shares: FloatArray) -> FloatArray:
+    """(V,) what the faces around each vertex hold of a whole's shares (F,), for their area."""
+    rows = mesh.faces.reshape(-1)
+    held, area = (np.bincount(rows, np.repeat(of, 3)) for of in (shares, mesh.face_areas))
+    return np.asarray(held / area)

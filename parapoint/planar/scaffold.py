@@ -147,6 +147,31 @@ def steps_down(
         yield moved
 
 
+def free_steps_down(
+    mesh: Mesh,
+    uv: FloatArray,
+    energy: igl.MappingEnergyType,
+    deadline: float = math.inf,
+) -> Iterator[FloatArray]:
+    """As `steps_down`, of maps without flips whose boundary may cross itself."""
+    state = igl.slim_precompute(
+        np.asfortranarray(LARGE * mesh.vertices),
+        np.asfortranarray(mesh.faces.astype(np.int32)),
+        np.asfortranarray(LARGE * uv),
+        energy,
+        np.zeros(0, dtype=np.int32),
+        np.zeros((0, 2), order="F"),
+        0.0,
+    )
+    for _ in range(MOST_STEPS):
+        if time.monotonic() > deadline:
+            return
+        moved = np.ascontiguousarray(igl.slim_solve(state, 1)[:, :2]) / LARGE
+        if not (signed_areas(moved, mesh.faces) > 0).all():
+            return
+        yield moved
+
+
 def excess(mesh: Mesh, uv: FloatArray, energy: igl.MappingEnergyType) -> float:
     """The mean of an energy over the area, above its least value, in units of this."""
     area = mesh.face_areas

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-import igl
 import numpy as np
 from scipy.sparse import csgraph
 
@@ -32,8 +31,6 @@ IN_BAND = 0.1
 """Cost of a cut among the faces across the seam, as a fraction of its cost elsewhere."""
 SHORTEST_BRANCH = 4
 """A branch of the seam is followed only if it has at least this many edges."""
-ROUNDS = 5
-"""Rounds, at most, in which the vertices of flipped faces are placed anew."""
 
 
 def edges_across_seam(
@@ -149,42 +146,6 @@ def _longest_path(mesh: Mesh, cost: FloatArray, band: BoolArray) -> BoolArray:
     if len(path) < 3:  # one edge opens nothing
         return disk_cut(mesh)
     return edge_mask(mesh, np.stack([path[:-1], path[1:]], axis=1))
-
-
-def unfolded(mesh: Mesh, uv: FloatArray, disk: Mesh) -> FloatArray:
-    """(V', 2) the map with every vertex of the cut mesh on its own side of the seam.
-
-    Vertices of faces that are not across the seam keep their uv. All others, which lie on the
-    wrong side or on neither, and those of flipped faces are placed where the map is most nearly
-    conformal.
-
-    Args:
-        mesh: the surface.
-        uv: (V, 2) its map.
-        disk: the mesh cut along `learned_seam`, without unreferenced vertices.
-
-    Raises:
-        RuntimeError: the linear system is singular.
-    """
-    origin = np.empty(len(disk.vertices), dtype=np.int64)
-    origin[disk.faces] = mesh.faces
-    sound = ~faces_across_seam(mesh, uv)
-    images = uv[origin]
-    if _doubled_areas(images[disk.faces[sound]]).sum() < 0:
-        images = images * [1.0, -1.0]
-    known = np.zeros(len(origin), dtype=bool)
-    known[disk.faces[sound]] = True
-    placed = images
-    for _ in range(ROUNDS):
-        rows = np.flatnonzero(known)
-        if len(rows) < 2:
-            break
-        placed = igl.lscm(disk.vertices, disk.faces, rows, np.ascontiguousarray(images[rows]))[0]
-        flipped = _doubled_areas(placed[disk.faces]) <= 0
-        if not flipped.any():
-            break
-        known[disk.faces[flipped]] = False
-    return np.asarray(placed)
 
 
 def opened(mesh: Mesh, uv: FloatArray, across: BoolArray) -> Parameterization:

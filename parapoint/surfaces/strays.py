@@ -30,7 +30,18 @@ CLUMP_SHARE = 0.05
 CLUMP_RADII = 10.0
 """Distance from the middle of the largest group, in half diagonals of the box around that one."""
 MOST = 0.1
-"""If a larger share of the points is in such groups, they are how the cloud is sampled."""
+"""If a larger share of the places is in such groups, they are how the cloud is sampled."""
+CLOUD_SHARE = 0.25
+"""A group of up to this share of the places is stray wherever it lies if it is no surface: if most
+of its points are LOOSE, or spread in all directions alike."""
+MOST_SHAPELESS = 0.5
+"""If a larger share of the places is in stray groups of either kind, none of it is left out."""
+LOOSE = 5.0
+"""Distance to the neighbour of rank NEAREST at which a point is loose, in typical spacings."""
+AROUND = 16
+"""Points whose spread tells how thick a group is."""
+THICK, THIN = 2.0, 0.2
+"""A group that is no surface is at least this much thicker than the largest, and than this."""
 SAMPLED = 5_000
 """Points whose spacing is looked at."""
 LARGEST = 1e12
@@ -126,7 +137,7 @@ def far_from(known: FloatArray, points: FloatArray) -> BoolArray:
     """(N,) whether points (N, 3) are stray beside the points (n, 3) of a surface.
 
     They are if they lie outside the ball around the surface, and farther from all of its points
-    than APART times the spacing of these.
+    than APART times the spacing of these, or than the radius of the ball.
     """
     frame = Frame.of(known)
     with np.errstate(over="ignore"):
@@ -135,7 +146,7 @@ def far_from(known: FloatArray, points: FloatArray) -> BoolArray:
             tree = cKDTree(known)
             looked_at = known[:: len(known) // SAMPLED + 1]
             nearest = tree.query(looked_at, min(NEAREST + 1, len(known)))[0][:, -1]
-            reach = APART * float(np.median(nearest))
+            reach = min(APART * float(np.median(nearest)), frame.scale)
             is_far[is_far] = ~np.isfinite(tree.query(points[is_far], distance_upper_bound=reach)[0])
     return is_far
 
@@ -162,13 +173,40 @@ def stray_points(points: FloatArray) -> BoolArray:
     links = coo_matrix((np.ones(len(pairs), dtype=bool), pairs.T), (len(cells),) * 2)
     group = connected_components(links, directed=False)[1][cell.reshape(-1)]
     count = np.bincount(group)
+    largest = int(count.argmax())
     few = max(FEW, FEW_SHARE * len(places))
     clumped = (count <= CLUMP_SHARE * len(places)) & _far_groups(places, group, count)
-    is_stray = ((count <= few) | clumped) & (count < count.max())
-    found: BoolArray = is_stray[group][place.reshape(-1)]
-    if found.mean() > MOST:
-        return np.zeros(len(points), dtype=bool)
-    return found
+    is_stray = ((count <= few) | clumped) & (np.arange(len(count)) != largest)
+    shapeless = np.zeros(len(count), dtype=bool)
+    for small in np.flatnonzero((count <= CLOUD_SHARE * len(places)) & (count < count[largest])):
+        of_group = places[group == small]
+        shapeless[small] = _is_loose(places, of_group, spacing) or (
+            _thickness(of_group) > THICK * max(_thickness(places[group == largest]), THIN)
+        )
+    if is_stray[group].mean() > MOST:
+        is_stray[:] = False
+    if (is_stray | shapeless)[group].mean() <= MOST_SHAPELESS:
+        is_stray |= shapeless
+    return np.asarray(is_stray[group][place.reshape(-1)])
+
+
+def _is_loose(places: FloatArray, some: FloatArray, spacing: float) -> bool:
+    """Whether most of some points (n, 3) are far from the nearest others, too."""
+    rank = min(NEAREST + 1, len(places))
+    distance = cKDTree(places).query(some[:: len(some) // SAMPLED + 1], [rank])[0]
+    return float(np.median(distance)) > LOOSE * spacing
+
+
+def _thickness(points: FloatArray) -> float:
+    """How little points (N, 3) spread like a surface: 0 in a plane, 1 alike in all directions."""
+    if len(points) <= AROUND:
+        return 0.0
+    some = points[:: len(points) // SAMPLED + 1]
+    near = cKDTree(points).query(some, AROUND)[1]
+    offsets = points[near] - points[near].mean(axis=1, keepdims=True)
+    spread = np.linalg.eigvalsh(np.einsum("nki,nkj->nij", offsets, offsets))
+    ratio = np.sqrt(np.maximum(spread[:, 0], 0) / np.maximum(spread[:, 1], 1e-300))
+    return float(np.median(ratio))
 
 
 def _far_groups(places: FloatArray, group: IntArray, count: IntArray) -> BoolArray:

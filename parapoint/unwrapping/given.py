@@ -39,7 +39,7 @@ def unwrapped_along(mesh: Mesh, seams: IntArray, deadline: float = math.inf) -> 
         if not chart.is_planar_domain:
             chart, completed = cut_to_disk(chart), completed + 1
         run = Run(chart, deadline)
-        run.begin(None)
+        run.begin()
         run.improve()
         parts.append(run.report())
         return Parameterization(run.uv, chart.faces)

@@ -18,13 +18,13 @@ from parapoint.planar.descent import LEAST_ENERGY, Run, sound
 from parapoint.planar.domains import FlatteningError
 from parapoint.planar.embedding import embeddable
 from parapoint.planar.growth import PRICE, grown
-from parapoint.surfaces.across_seams import learned_seam, unfolded
+from parapoint.surfaces.across_seams import learned_seam
 from parapoint.surfaces.areas import MOST_STARVED, starved_share
 from parapoint.surfaces.cutting import cut_along, disk_cut, edge_lengths
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.preparation import prepared
 from parapoint.surfaces.sampling import FEWEST_VERTICES
-from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, Surface
+from parapoint.surfaces.surface import BoolArray, Mesh, Surface
 
 POINTS_OF_A_FACE = 100
 """Points that are sampled on each face of a mesh with few faces. Along the seams of a fish of 220
@@ -127,7 +127,6 @@ class Unwrap:
             return Parameterization(whole.uv, whole.mesh.faces, report=report)
         points = self.points or _enough_points(mesh, ComputedMap().points)
         budget = None if seconds is None else SHARE_OF_SEAM * seconds
-        start: FloatArray | None = None
         computed: dict[str, object]
         try:
             learned = ComputedMap(points, distortion="conformal", time_budget=budget).parameterize(
@@ -143,10 +142,8 @@ class Unwrap:
             computed = dict(learned.report)
             seam = learned_seam(mesh, learned.uv)
             disk = cut_along(mesh, mesh.edges[seam])
-            start = unfolded(mesh, learned.uv, disk)
-        opened = embeddable(disk)
-        run = Run(opened, deadline)
-        run.begin(start if len(opened.vertices) == len(disk.vertices) else None)
+        run = Run(embeddable(disk), deadline)
+        run.begin()
         run.improve()
         if self.price is not None:
             if whole is not None and whole.energy <= run.energy + self.price * _length(mesh, seam):
@@ -166,7 +163,7 @@ class Unwrap:
             return None
         run = Run(mesh, deadline)
         try:
-            run.begin(None)
+            run.begin()
         except FlatteningError:
             return None
         run.improve()

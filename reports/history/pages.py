@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from parapoint.errors import InputError
+from parapoint.files.targets import write_text
 from reports.history.comparison import Comparison
 from reports.history.tables import alone, by_metric, ended, moved, summary
 from reports.pictures.names import slug
@@ -31,7 +32,7 @@ def write(folder: Path, others: Sequence[Path]) -> list[tuple[Path, str]]:
         formats.write(made, into)
         lead = said(found)
         page = formats.html(f"{folder} against {other}", made, lead)
-        (into / "index.html").write_text(page, encoding="utf-8")
+        write_text(into / "index.html", page)
         written.append((into / "index.html", lead))
     return written
 

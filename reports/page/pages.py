@@ -14,6 +14,7 @@ from matplotlib.colors import to_hex
 
 from benchmarks.metrics.grades import BOUNDS
 from benchmarks.rendering.maps import ANGLE_SCALE, AREA_SCALE
+from parapoint.files.targets import write_text
 from reports.contents import Label
 from reports.page import board, viewer
 from reports.page.sections import Section
@@ -167,5 +168,5 @@ def write(report: Path, folder: str, sections: Sequence[Section], links: Links =
 def put(path: Path, text: str) -> Path:
     """Write a page, and the folders above it; its path."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, encoding="utf-8")
+    write_text(path, text)
     return path

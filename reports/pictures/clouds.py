@@ -29,6 +29,7 @@ from benchmarks.rendering.scene import Scene, View
 from benchmarks.rendering.viewpoints import two_cameras
 from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
+from parapoint.surfaces.normals import oriented_normals
 from parapoint.surfaces.parameterization import PointParameterization
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh, PointCloud
 
@@ -141,8 +142,6 @@ class Portrait:
         self.cloud = cloud
         normals = cloud.normals
         if normals is None:
-            from parapoint.learned.trainer import oriented_normals  # which needs torch
-
             normals = oriented_normals(cloud.points)
             outward = np.einsum("pk,pk->p", normals, cloud.points - cloud.points.mean(axis=0))
             normals = normals * (1 if outward.sum() >= 0 else -1)

@@ -18,6 +18,7 @@ from benchmarks.rendering.maps import FIELDS, SAMPLES
 from benchmarks.store.results import Store
 from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
+from parapoint.files.targets import write_text
 from parapoint.sources import source_hash
 from parapoint.surfaces.surface import PointCloud
 from reports.contents import Contents
@@ -87,7 +88,7 @@ def draw(contents: Contents, folder: Path, jobs: int, progress: Progress = QUIET
 
 def _note(record: Path, keys: Mapping[str, str]) -> None:
     """Keep what `known_keys` is to return."""
-    record.write_text(json.dumps(keys, indent=0, sort_keys=True) + "\n")
+    write_text(record, json.dumps(keys, indent=0, sort_keys=True) + "\n")
 
 
 PLAIN_NAME = re.compile(r"\w[\w.+-]*")

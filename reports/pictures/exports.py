@@ -15,7 +15,7 @@ from PIL import Image
 from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
 from parapoint.files.mesh_writers import write_obj
-from parapoint.files.targets import complete_file
+from parapoint.files.targets import complete_file, write_text
 from parapoint.sources import source_hash
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh
@@ -65,7 +65,7 @@ def write(contents: Contents, report: Path, progress: Progress = QUIET) -> list[
                 continue  # a cloud has no faces for a texture
             textured(_stem(report, row), surface, result)
         keys[row.id] = key
-    record.write_text(json.dumps(keys, indent=0, sort_keys=True) + "\n")
+    write_text(record, json.dumps(keys, indent=0, sort_keys=True) + "\n")
     return faults
 
 

@@ -24,6 +24,7 @@ from PIL import ImageColor
 from pypdf import PdfWriter
 
 from benchmarks.store.rows import ResultRow
+from parapoint.files.targets import complete_file, write_text
 from parapoint.sources import source_hash
 from reports.contents import SHEETS, Contents
 from reports.pictures.clouds import DENSE, SPARSE, points_used
@@ -343,7 +344,7 @@ def draw(
     make = partial(write, folder, contents.is_large)
     made = done_by_several(make, [(drawing,) for drawing in changed], jobs)
     list(progress.track(made, f"{contents.suite}: figures", len(changed)))
-    record.write_text(json.dumps(keys, indent=0, sort_keys=True) + "\n")
+    write_text(record, json.dumps(keys, indent=0, sort_keys=True) + "\n")
     for name in known.keys() - keys.keys():  # of a folder that grew
         for ending in ENDINGS:
             (folder / f"{name}{ending}").unlink(missing_ok=True)
@@ -353,7 +354,7 @@ def draw(
         if (folder / f"{one.name}.png").exists()
     ]
     captions = [f"## {one.name}\n\n**{one.title}.** {one.caption}\n" for one in drawn]
-    (folder / "captions.md").write_text("\n".join(captions), encoding="utf-8")
+    write_text(folder / "captions.md", "\n".join(captions))
     return drawn
 
 
@@ -380,7 +381,8 @@ def write(folder: Path, coarse: bool, drawing: Drawing) -> None:
             shown.set_data(on_white(shown.get_array()))
         content = io.BytesIO()
         made.savefig(content, format="pdf", metadata={"CreationDate": None, "Title": drawing.title})
-        document.write_bytes(light(content) if pictures else content.getvalue())
+        with complete_file(document) as stream:
+            stream.write(light(content) if pictures else content.getvalue())
         for shown, picture in zip(pictures, as_shown, strict=True):
             shown.set_interpolation("antialiased")
             shown.set_data(picture)
@@ -400,7 +402,8 @@ def few_colours(made: Figure, paper: str, path: Path) -> None:
         levels[(np.abs(levels - exact) < 8).all(axis=1)] = exact
         colours.putpalette(levels.reshape(-1).tolist())
         few = whole.quantize(palette=colours, dither=Images.Dither.FLOYDSTEINBERG)
-        few.save(path, optimize=True, dpi=image.info["dpi"])
+        with complete_file(path) as file:
+            few.save(file, format="PNG", optimize=True, dpi=image.info["dpi"])
 
 
 def on_white(picture: Any) -> Any:

@@ -29,6 +29,9 @@ from reports.pictures.names import ARTIST_PICTURES, CLOUD_PICTURES, map_file, mo
 from reports.pictures.style import WIDTH, figure, picture_grid, put, wrapped
 from reports.tables.table import metric_column
 
+LETTER = 0.065
+"""Width of a letter above a column, in inches, at most."""
+
 
 def leading(contents: Contents, method: str) -> Label | None:
     """The parameters of a method that the supplement's figures show.
@@ -199,9 +202,11 @@ def ablation(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure
     made = figure(WIDTH, height)
     for column, label in enumerate(labels):
         x = left + column * (side + gap)
-        words = wrapped(label.short.removeprefix(f"{label.name} "), 17)
+        words = wrapped(label.short.removeprefix(f"{label.name} "), round(side / LETTER))
         words = "unchanged" if label.short == label.name else words
-        made.text((x + side / 2) / WIDTH, 1 - 0.05 / height, words, ha="center", va="top")
+        made.text(
+            (x + side / 2) / WIDTH, 1 - 0.05 / height, words, ha="center", va="top", fontsize=6.5
+        )
         for number, case in enumerate(cases):
             y = height - top - number * (2 * side + foot)
             shown = pictures_of(contents, case, label, ("layout", "checker-1"), pictures)

@@ -23,6 +23,7 @@ from benchmarks.rendering.maps import (
 from benchmarks.rendering.scene import Scene
 from benchmarks.rendering.viewpoints import two_cameras
 from parapoint.errors import InputError
+from parapoint.files.targets import complete_file, write_text
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh
 from reports.page import viewer
@@ -105,6 +106,7 @@ def viewed(found: Map) -> viewer.Script:
 def save(content: Content, path: Path) -> None:
     """Write a script, or a picture as WebP: the same content gives the same bytes."""
     if isinstance(content, tuple):
-        path.write_text(viewer.script(path.name, *content), encoding="utf-8")
+        write_text(path, viewer.script(path.name, *content))
     else:
-        Images.fromarray(content).save(path, format="WebP", quality=78, method=4)
+        with complete_file(path) as file:
+            Images.fromarray(content).save(file, format="WebP", quality=78, method=4)

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
+from parapoint.files.targets import write_text
 from reports.tables.table import Cell, Column, Table, Value, grouped
 
 PAGE = 45
@@ -21,10 +22,10 @@ def write(made: Sequence[Table], folder: Path) -> None:
     """Write each table to `folder` as LaTeX, Markdown, CSV and HTML."""
     folder.mkdir(parents=True, exist_ok=True)
     for table in made:
-        (folder / f"{table.name}.tex").write_text(latex(table), encoding="utf-8")
-        (folder / f"{table.name}.md").write_text(markdown(table), encoding="utf-8")
-        (folder / f"{table.name}.csv").write_text(comma_separated(table), encoding="utf-8")
-        (folder / f"{table.name}.html").write_text(html(table.title, [table]), encoding="utf-8")
+        write_text(folder / f"{table.name}.tex", latex(table))
+        write_text(folder / f"{table.name}.md", markdown(table))
+        write_text(folder / f"{table.name}.csv", comma_separated(table))
+        write_text(folder / f"{table.name}.html", html(table.title, [table]))
 
 
 _LATEX = {

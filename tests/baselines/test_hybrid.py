@@ -13,7 +13,7 @@ from parapoint.method import UnsupportedError
 from parapoint.planar.crossing import crossing_vertices
 from parapoint.planar.descent import Run
 from parapoint.planar.growth import grown
-from parapoint.surfaces.across_seams import learned_seam, unfolded
+from parapoint.surfaces.across_seams import learned_seam
 from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.cutting import cut_along, cut_to_disk, disk_cut, edge_lengths
 from parapoint.surfaces.parameterization import Parameterization
@@ -51,18 +51,6 @@ def test_the_seam_of_a_map_is_found_again_as_a_clean_path(make):
     near = on_cut.copy()
     near[mesh.edges[on_cut[mesh.edges].any(axis=1)]] = True
     assert near[mesh.edges[seam]].mean() > 0.95
-
-
-def test_the_banks_are_unfolded():
-    mesh = builtin.torus(16)
-    uv = torn(mesh, disk_cut(mesh))
-    disk = cut_along(mesh, mesh.edges[learned_seam(mesh, uv)])
-    flat = unfolded(mesh, uv, disk)
-    assert (signed_areas(flat, disk.faces) > 0).mean() > 0.99
-    # No face is drawn across the plane: the longest edge is not much longer than in space.
-    ends = disk.edges
-    ratio = np.linalg.norm(flat[ends[:, 0]] - flat[ends[:, 1]], axis=1) / edge_lengths(disk)
-    assert ratio.max() < 4
 
 
 def test_a_map_without_a_tear_has_no_seam():
@@ -114,7 +102,7 @@ def test_a_map_stays_one_to_one_where_free_steps_do_not():
     free = registry.method("slim")[1].parameterize(mesh, seed=0)
     assert len(crossing_vertices(mesh, free.uv)) > 0
     run = Run(mesh)
-    run.begin(None)
+    run.begin()
     run.improve()
     assert len(crossing_vertices(mesh, run.uv)) == 0
     assert (signed_areas(run.uv, mesh.faces) > 0).all()
@@ -166,7 +154,7 @@ def test_a_branch_must_pay():
     energies = []
     for price in (1e9, 0.05):
         run = Run(cap)
-        run.begin(None)
+        run.begin()
         run.improve()
         run = grown(run, price)
         energies.append(run.energy)
@@ -180,7 +168,7 @@ def test_the_price_of_a_seam_is_the_same_at_every_scale():
     found = []
     for scale in (1, 2.0**10):  # exact: the two runs differ by nothing but the unit
         run = Run(Mesh(scale * cap.vertices, cap.faces))
-        run.begin(None)
+        run.begin()
         run.improve()
         run = grown(run, 0.05)
         found.append((run.branches, run.energy))

@@ -44,6 +44,21 @@ def test_a_bug_is_not_dressed_up_as_bad_input():
         console.run(command, [])
 
 
+def test_a_package_that_is_not_installed_is_one_line(capsys):
+    @click.command
+    def command():
+        import no_such_package
+
+        no_such_package.use()
+
+    with pytest.raises(SystemExit) as caught:
+        console.run(command, [])
+    assert caught.value.code == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert err.startswith("error: no_such_package is not installed; ")
+
+
 @pytest.mark.parametrize("module", ["parapoint", "baselines.registry", "benchmarks", "reports"])
 def test_light_imports_leave_torch_out(module):
     code = f"import sys, {module}; sys.exit('torch' in sys.modules)"

@@ -50,6 +50,9 @@ def test_none_takes_the_preset_s_value() -> None:
     assert ParaPoint(preset="paper").numbers() == PRESETS["paper"]
     changed = ParaPoint(preset="paper", distortion="isometric", distortion_weight=1e-4).numbers()
     assert (changed.distortion, changed.distortion_weight) == ("isometric", 1e-4)
+    left_out = ParaPoint(preset="paper", unwrap_weight=0, cycle_weight=0, anti_flip_weight=0)
+    kept = {name: weight for name, weight in left_out.numbers().facts().items() if "weight" in name}
+    assert {name for name, weight in kept.items() if weight} == {"wrap_weight", "distortion_weight"}
 
 
 @pytest.mark.parametrize(

@@ -107,3 +107,37 @@ def test_a_list_fits_a_terminal_and_keeps_every_word(what, width):
     text = "".join("".join(lines).split())
     for column in table.columns:
         assert all("".join(str(cell).split()) in text for cell in column.cells)
+
+
+WITHOUT_TORCH = "import sys; sys.modules['torch'] = None; from parapoint import console\n"
+OURS = "from parapoint.cli import parapoint as main"
+BENCHMARKS = "from benchmarks.__main__ import main"
+
+
+def without_torch(program, words, folder):
+    code = f"{WITHOUT_TORCH}{program}\nconsole.run(main, {words})"
+    command = [sys.executable, "-c", code]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize(
+    ("program", "words"),
+    [
+        (OURS, ["fit", "x", "--out", "y", "--preset", "paper"]),
+        (BENCHMARKS, ["run", "paper"]),
+        (BENCHMARKS, ["run", "--methods", "fam", "--cases", "saddle"]),
+    ],
+)
+def test_where_torch_is_missing_one_line_says_what_would_do(program, words, tmp_path):
+    done = without_torch(program, words, tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "pip install torch" in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_torch_everything_else_is_listed(tmp_path):
+    done = without_torch(BENCHMARKS, ["list", "methods"], tmp_path)
+    lines = {line.split("\t")[0]: line for line in done.stdout.splitlines()}
+    assert "pip install torch" in lines["nuvo"]
+    assert "pip install torch" not in lines["computed"] + lines["slim"]

@@ -27,7 +27,7 @@ def test_cases_and_methods_exist(name):
 
 def test_the_suites():
     expected = {"smoke", "builtin", "paper", "disk", "closed", "genus", "cad", "wild", "scans"}
-    expected |= {"artist", "core", "ablation", "quality", "seeds", "noise", "cuts", "neural"}
+    expected |= {"artist", "core", "ablation", "quality", "seeds", "noise", "cuts", "neural", "gpu"}
     assert expected == set(SUITES)
     assert SUITES["builtin"].cases == tuple(BUILTIN)
     assert len(SUITES["paper"].cases) == 6
@@ -67,7 +67,21 @@ def test_each_ablation_changes_one_option_of_the_paper_s_training():
         {"branches": "2d"},
         {"branches": "3d"},
         {"distortion_weight": 1e-4},
+        {"distortion_weight": 0},
+        {"unwrap_weight": 0},
+        {"cycle_weight": 0},
+        {"anti_flip_weight": 0},
     ]
+
+
+def test_the_gpu_has_the_paper_s_whole_budget_and_no_other_device():
+    from parapoint.learned.presets import PAPER
+
+    (spec,) = SUITES["gpu"].methods
+    given = {name: value for name, value in parameters(spec).items() if value is not None}
+    assert (given["preset"], given["device"]) == ("paper", "cuda")
+    assert not {"points", "iterations", "time_budget"} & set(given)
+    assert (PAPER.points, PAPER.iterations) == (10_000, 10_000)
 
 
 def test_our_training_differs_from_the_paper_s_by_its_preset_alone():

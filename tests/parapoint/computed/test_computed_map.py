@@ -109,12 +109,15 @@ def test_each_component_gets_a_map_and_they_stand_apart(tmp_path) -> None:
     assert np.array_equal(load(tmp_path).transform(far), right)
 
 
-def test_points_off_the_surface_are_counted_and_mapped(caplog) -> None:
+def test_points_off_the_surface_are_counted_and_mapped_nowhere(caplog) -> None:
     points = np.concatenate([paraboloid(), paraboloid(100) + np.array([500.0, 0, 0])])
     with caplog.at_level(logging.WARNING, logger="parapoint"):
         model = ComputedMap().fit(points)
     assert "100 of 500 points are not on the surface that was found" in caplog.text
-    assert np.isfinite(model.transform(points)).all()
+    is_mapped = np.isfinite(model.transform(points)).all(axis=1)
+    np.testing.assert_array_equal(is_mapped, np.arange(500) < 400)
+    each = ComputedMap(components="each").fit(points)
+    assert np.isfinite(each.transform(points)).all()
 
 
 def test_points_that_nearly_coincide_count_once() -> None:

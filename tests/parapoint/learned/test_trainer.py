@@ -13,8 +13,6 @@ from parapoint.learned.trainer import (
     DivergedError,
     Trainer,
     objective_terms,
-    oriented_normals,
-    tangent_frames,
 )
 
 TINY = Preset(hidden=(8, 8), embedding=4, subset=100, iterations=40, points=200)
@@ -292,23 +290,6 @@ def test_terms_of_the_objective_use_the_preset(monkeypatch) -> None:
     )
     next(tiny().run())
     assert calls == {"unwrap": (8, 0.1), "flip": (4, math.pi / 2)}
-
-
-def test_normals_are_oriented_alike() -> None:
-    points = sphere(1000)
-    outward = (oriented_normals(points) * points).sum(axis=1)
-    assert np.abs(outward).min() > 0.9
-    assert abs(np.sign(outward).sum()) == 1000
-    two = np.concatenate([points, points + 10])  # two components are each oriented
-    outward = (oriented_normals(two) * np.concatenate([points, points])).sum(axis=1)
-    assert abs(np.sign(outward[:1000]).sum()) == abs(np.sign(outward[1000:]).sum()) == 1000
-
-
-def test_tangent_frames_are_right_handed_around_the_normals() -> None:
-    points = sphere(500)
-    first, second = tangent_frames(points)
-    np.testing.assert_allclose(np.cross(first, second), oriented_normals(points), atol=1e-12)
-    np.testing.assert_allclose((first * second).sum(axis=1), 0, atol=1e-12)
 
 
 def test_the_unfolding_term_counts_only_with_a_weight() -> None:

@@ -11,7 +11,7 @@ from parapoint.surfaces.parameterization import Parameterization
 def test_a_seam_leads_to_what_is_starved() -> None:
     mesh = builtin.finger()
     run = Run(mesh)
-    run.begin(None)
+    run.begin()
     run.improve()
     before = evaluate(mesh, Parameterization(run.uv, mesh.faces))["starved_area_fraction"]
     assert before > MOST_STARVED

@@ -85,11 +85,36 @@ def test_a_clump_is_told_and_mapped_nowhere(caplog: pytest.LogCaptureFixture) ->
 
 
 def test_points_off_the_surface_that_was_found_are_named(caplog: pytest.LogCaptureFixture) -> None:
-    """A clump too near to be stray is told by its rows."""
+    """A clump too near to be stray is told by its rows, and mapped nowhere."""
     points = np.concatenate([dome(600), clump(30, 5, 0, 0)])
     with caplog.at_level(logging.WARNING):
-        ComputedMap().fit(points)
+        found = ComputedMap().parameterize(PointCloud(points), seed=0)
     assert "30 of 630 points are not on the surface that was found: rows 600, 601," in caplog.text
+    assert_array_equal(np.isnan(found.uv).all(axis=1), np.arange(630) >= 600)
+
+
+@pytest.mark.parametrize("share", [0.12, 0.2, 0.3])
+@pytest.mark.parametrize("radii", [100, 1e4, 1e6])
+def test_many_strays(share: float, radii: float) -> None:
+    """More than one of ten, as scanners of glass and water write; so are rows without data."""
+    points = dome(4000)
+    for strays in (flying(round(4000 * share), radii), np.full((round(4000 * share), 3), -radii)):
+        both = np.concatenate([points, strays])
+        assert_array_equal(stray_points(both), np.arange(len(both)) >= 4000)
+
+
+@pytest.mark.parametrize("share", [0.02, 0.08, 0.2])
+@pytest.mark.parametrize("away", [4, 8, 100])
+def test_clouds_of_noise_are_strays_and_patches_are_none(share: float, away: float) -> None:
+    """A blob spreads in all directions alike; the same number of points on a sphere does not."""
+    points, count = dome(8000), round(8000 * share)
+    middle = np.array([away, 0.0, 0.0])
+    blob = np.random.default_rng(3).normal(scale=0.1, size=(count, 3)) + middle
+    is_stray = stray_points(np.concatenate([points, blob]))
+    assert_array_equal(is_stray, np.arange(8000 + count) >= 8000)
+    patch = 0.3 * dome(count) + middle
+    far = away > 10 and share < 0.05
+    assert stray_points(np.concatenate([points, patch])).sum() == far * count
 
 
 def test_two_objects_of_equal_size_are_no_strays() -> None:

@@ -8,10 +8,7 @@ import pytest
 
 from parapoint import cli
 from parapoint.files.reading import read_parameterized, read_surface
-from parapoint.surfaces.parameterization import Charted, Parameterization
-from parapoint.surfaces.surface import Mesh
 from parapoint.testing import irregular_disk
-from parapoint.unwrapping.quality import quality
 from parapoint.unwrapping.unwrap import Unwrap
 
 BOX = """# a box of quads
@@ -107,18 +104,9 @@ def test_a_seam_through_a_polygon_makes_it_triangles_and_says_so(
     assert (tmp_path / "out.obj").read_text().count("\nf ") == 7
 
 
-def test_a_texture_of_the_old_uvs_is_not_shown_with_the_new(box, tmp_path, capsys, caplog) -> None:
-    (tmp_path / "colours.mtl").write_text("newmtl red\nmap_Kd wood.png\n")
-    unfold(box, tmp_path / "out.obj", capsys)
-    assert "were drawn for other UVs" in caplog.text
-    written = (tmp_path / "out.obj").read_text()
-    assert "mtllib" not in written
-    assert "usemtl red" in written
-
-
 def test_other_formats_and_one_uv_a_vertex(box, tmp_path, capsys, caplog) -> None:
     unfold(box, tmp_path / "out.npz", capsys)
-    assert "left out: old UVs, polygons" in caplog.text
+    assert "left out: old UVs, polygons. A .obj file would keep them" in caplog.text
     with np.load(tmp_path / "out.npz") as held:
         assert held["vertices"].shape == (8, 3)
         assert held["uv"].shape == (14, 2)
@@ -185,28 +173,3 @@ def test_a_lower_bound_makes_a_longer_seam() -> None:
         ends = cap.vertices[made.seams(cap)]
         seam.append(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum())
     assert seam[1] > seam[0]
-
-
-def test_quality_by_hand() -> None:
-    # Two right triangles of a unit square; the second is shrunk to a tenth.
-    vertices = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
-    mesh = Mesh(vertices, [[0, 1, 2], [0, 2, 3]])
-    uv = np.array([[0, 0], [0.5, 0], [0.5, 0.5], [0.6, 0.6], [0.65, 0.65], [0.6, 0.65]])
-    found = quality(Charted(mesh, Parameterization(uv, [[0, 1, 2], [3, 4, 5]])), 1000)
-    assert found.starved == pytest.approx(0.5)
-    assert found.smallest_part == pytest.approx(2 / 101)
-    assert found.flipped == 0
-    assert found.charts == 2
-    assert found.seam == pytest.approx(2**0.5)
-    assert found.filled == pytest.approx(0.12625)
-    assert found.angle_worst == pytest.approx(0, abs=1e-9)
-    assert found.texels_per_unit == pytest.approx(1000 * 0.12625**0.5)
-    scale = (1 / 0.12625) ** 0.5
-    assert found.stretch_worst == pytest.approx(1 / (0.05 * scale))
-    assert found.stretch_mean == pytest.approx((0.5 * scale + 1 / (0.05 * scale)) / 2)
-    # Sheared by one: the right angle becomes one of 45 degrees.
-    sheared = Parameterization([[0, 0], [1, 0], [2, 1], [1, 1]], mesh.faces)
-    assert quality(Charted(mesh, sheared), 1).angle_worst == pytest.approx(45)
-    assert quality(Charted(mesh, sheared), 1).charts == 1
-    mirrored = Parameterization([[0, 0], [-1, 0], [-1, 1], [0, 1]], mesh.faces)
-    assert quality(Charted(mesh, mirrored), 1).flipped == 2
