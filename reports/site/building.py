@@ -16,6 +16,7 @@ from tempfile import TemporaryDirectory
 
 from benchmarks.store import merging
 from parapoint.errors import InputError
+from reports import citing
 from reports.contents import contents
 from reports.history.comparison import Comparison
 from reports.history.pages import said
@@ -69,6 +70,7 @@ def build(sources: Sequence[Path], out: Path, *, jobs: int, progress: Progress =
             faults = pictures.draw(suite, out / "figures" / name / "pictures", jobs, progress)
             results = Path("results") / suite.suite
             sections.append(Section(out, suite, made, (), faults, results))
+        citing.write(out, suites)
         links = methods.write(out, sections)
         links += [("history", address) for address in _history(sources, folders, out)]
         index = pages.write(out, "results", sections, links)
