@@ -34,6 +34,11 @@ from parapoint.textures.placing import BORDER
     show_default=True,
     help="One map of all, or of each or the largest component.",
 )
+@click.option(
+    "--distortion",
+    metavar="D",
+    help="conformal, balanced (default of a cloud) or isometric (of a mesh).",
+)
 @click.option("--seam-price", type=float, metavar="P", help="Energy a branch must gain a length.")
 @click.option("--max-distortion", type=float, metavar="E", help="Cut on until the energy is E.")
 @click.option("--seams", metavar="FILE", help="Cut along these edges: two vertex numbers a line.")
@@ -56,6 +61,7 @@ def unwrap(
     as_json: bool,
     seams: str | None,
     per_vertex: bool,
+    distortion: str | None,
     seam_price: float | None,
     max_distortion: float | None,
     **settings: Any,
@@ -68,6 +74,9 @@ def unwrap(
     written. Branches of the seam grow where each lowers the energy (symmetric Dirichlet, 4 at
     least) by --seam-price (1) for a length of the square root of the area; --max-distortion adds
     to them until the energy is as low, within --time-budget.
+
+    --distortion isometric keeps angles and areas alike; balanced keeps angles as far as every part
+    keeps its area; conformal keeps angles alone, whatever becomes of an ear or a finger.
 
     Of a cloud FILE.glb is a mesh of it, with its colours baked into a texture (a checkerboard where
     it has none); so are .obj and .ply with --texture. Without they are its points and their UVs.
@@ -83,15 +92,22 @@ def unwrap(
         from parapoint.unwrapping.unwrap import Unwrap
 
         check_choice("components", settings["components"], COMPONENTS)
-        grown = {"--seam-price": seam_price, "--max-distortion": max_distortion}
+        grown: dict[str, object] = {
+            "--seam-price": seam_price,
+            "--max-distortion": max_distortion,
+            "--distortion": distortion,
+        }
         grown["--components largest"] = settings["components"] == "largest" or None
         for option, given_value in grown.items():
             if seams is not None and given_value is not None:
                 raise InputError(f"{option} does not go with --seams, which are cut as they are")
+        if seam_price is not None and distortion == "conformal":
+            raise InputError("--seam-price does not go with --distortion conformal")
         method = Unwrap(
             time_budget=settings["time_budget"],
             price=Unwrap.price if seam_price is None else seam_price,
             max_distortion=max_distortion,
+            distortion=distortion or Unwrap.distortion,
         )
         mesh, chosen = given.mesh, None
         if settings["components"] == "largest" and mesh.component_count > 1:
@@ -114,6 +130,7 @@ def unwrap(
     for option, value in {**unused, "--per-vertex": per_vertex or None}.items():
         if value is not None:
             raise InputError(f"{option} is for meshes; {surface} is a point cloud")
+    settings["distortion"] = distortion
     model = fitted(surface, given, estimator_of("computed", settings))
     written = components(given)[0] if model.components == "largest" else given
     facts = write(model, written, out, texture=texture, margin=margin, preview=picture)

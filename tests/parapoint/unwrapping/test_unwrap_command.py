@@ -8,6 +8,7 @@ import pytest
 
 from parapoint import cli
 from parapoint.files.reading import read_parameterized, read_surface
+from parapoint.surfaces.areas import MOST_STARVED
 from parapoint.testing import irregular_disk
 from parapoint.unwrapping.unwrap import Unwrap
 
@@ -173,3 +174,50 @@ def test_a_lower_bound_makes_a_longer_seam() -> None:
         ends = cap.vertices[made.seams(cap)]
         seam.append(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum())
     assert seam[1] > seam[0]
+
+
+@pytest.fixture(scope="module")
+def bump():
+    """A sphere but for a cap: along no cut, angles and areas are not to be had together."""
+    from benchmarks.cases import builtin
+
+    return builtin.sphere_cap(150, rings=8)
+
+
+@pytest.mark.parametrize("distortion", ["conformal", "balanced"])
+def test_a_map_that_is_to_keep_angles_keeps_them_better(bump, distortion) -> None:
+    from benchmarks.metrics.evaluation import evaluate
+
+    made = {
+        name: evaluate(bump, Unwrap(points=150, price=1e9, distortion=name).unwrapped(bump))
+        for name in ("isometric", distortion)
+    }
+    off = {name: found["angle_difference_mean"] for name, found in made.items()}
+    assert off[distortion] < 0.8 * off["isometric"]
+    assert made["isometric"]["symmetric_dirichlet"] < made[distortion]["symmetric_dirichlet"]
+    for found in made.values():
+        assert found["flipped_fraction"] == found["overlap_area"] == 0
+    if distortion == "balanced":
+        assert made["balanced"]["starved_area_fraction"] <= MOST_STARVED
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--distortion", "conformal", "--max-distortion", 4.5], "max_distortion bounds an energy"),
+        (["--distortion", "conformal", "--seam-price", 1], "--seam-price does not go"),
+        (["--distortion", "wavy"], "isometric"),
+    ],
+)
+def test_options_that_do_not_go_together_are_refused(box, tmp_path, capsys, options, words) -> None:
+    status, _, said = run(["unwrap", box, "--out", tmp_path / "new.glb", *options], capsys)
+    assert status == 2
+    assert words in said
+    assert len(said.strip().splitlines()) == 1
+    assert not (tmp_path / "new.glb").exists()
+
+
+def test_a_distortion_does_not_go_with_seams_that_are_given(box, tmp_path, capsys) -> None:
+    status, _, said = unfold(box, tmp_path / "new.glb", capsys, "--distortion", "balanced")
+    assert status == 2
+    assert "--distortion does not go with --seams" in said
