@@ -250,8 +250,12 @@ def _content(path: Path) -> Content:
 
 
 def _check_fits_together(content: Content) -> None:
-    """Check that normals, UVs and UVs of corners are numbers of the shapes that `Content` has."""
+    """Check that what a file holds is numbers of the shapes that `Content` has, a mesh finite."""
     count = len(content.vertices)
+    infinite = ~np.isfinite(content.vertices).all(axis=1)
+    if len(content.sizes) and infinite.any():
+        row = int(infinite.argmax())
+        raise InputError(f"vertices must be finite; row {row} is {content.vertices[row].tolist()}")
     uv_count = 0 if content.uv is None else content.uv.size // 2
     for name, values, shape in (
         ("normals", content.normals, (count, 3)),
@@ -271,7 +275,7 @@ def _mesh(content: Content) -> tuple[Mesh, IntArray]:
     if small.any():
         face = int(np.flatnonzero(small)[0])
         raise InputError(f"face {face} has {int(content.sizes[face])} corners; it needs three")
-    vertices = read_only(content.vertices, np.float64, "vertices", 3)
+    vertices = content.vertices
     outside = (content.corners < 0) | (content.corners >= len(vertices))
     if outside.any():
         corner = int(np.flatnonzero(outside)[0])
