@@ -50,6 +50,7 @@ METHODS: dict[str, str] = {
     "automatic+slim": "baselines.hybrid:AutomaticSLIM",
     "artist+slim": "baselines.hybrid:ArtistSLIM",
     "meshed": "baselines.meshed:Meshed",
+    "textured": "baselines.textured:Textured",
     "external": "baselines.tools.external:External",
     "parapoint": "parapoint.learned.parapoint:ParaPoint",
     "computed": "parapoint.computed.computed_map:ComputedMap",

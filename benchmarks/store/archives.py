@@ -46,9 +46,12 @@ def surface_arrays(surface: Surface) -> dict[str, npt.NDArray[Any]]:
     """The arrays that make up `surface`."""
     if isinstance(surface, Mesh):
         return {"vertices": surface.vertices, "faces": surface.faces}
-    if surface.normals is None:
-        return {"points": surface.points}
-    return {"points": surface.points, "normals": surface.normals}
+    arrays = {"points": surface.points}
+    if surface.normals is not None:
+        arrays["normals"] = surface.normals
+    if "colours" in surface.attributes:
+        arrays["colours"] = surface.attributes["colours"]
+    return arrays
 
 
 def map_arrays(result: Parameterization | PointParameterization) -> dict[str, npt.NDArray[Any]]:
@@ -188,7 +191,8 @@ def read_surface(path: Path) -> Surface:
     try:
         if "faces" in arrays:
             return Mesh(arrays["vertices"], arrays["faces"])
-        return PointCloud(arrays["points"], arrays.get("normals"))
+        attributes = {name: arrays[name] for name in ("colours",) if name in arrays}
+        return PointCloud(arrays["points"], arrays.get("normals"), attributes=attributes)
     except (InputError, KeyError) as error:
         raise InputError(f"{path}: damaged ({error})") from None
 
