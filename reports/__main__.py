@@ -8,6 +8,7 @@ import click
 
 from benchmarks.running.environment import cores
 from parapoint import __version__, console
+from parapoint.commands.memory import memory_option
 
 PATH = click.Path(path_type=Path)
 
@@ -43,6 +44,7 @@ def main() -> None:
     type=PATH,
     help="An earlier results folder, or another machine's; may be given several times.",
 )
+@memory_option
 def report(folder: Path, exports: bool, against: tuple[Path, ...]) -> None:
     """Write the report, or the comparisons, and say where they are."""
     if against:
