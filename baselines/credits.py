@@ -48,6 +48,10 @@ CREDITS = {
     "automatic+slim": Credit(LIBIGL, ("rabinovich2017", "libigl")),
     "artist+slim": Credit(LIBIGL, ("rabinovich2017", "libigl")),
     "meshed": Credit(MESHLAB, ("kazhdan2013", "bernardini1999", "cignoni2008")),
+    "textured": Credit(
+        f"{OURS}; {MESHLAB} and MIT (xatlas) for what is usual today",
+        ("kazhdan2013", "bernardini1999", "cignoni2008", "xatlas"),
+    ),
     "external": Credit("that of the program"),
     "parapoint": Credit(OURS, ("zhang2024parapoint",)),
     "computed": Credit(LIBIGL, ("libigl",)),
