@@ -35,8 +35,14 @@ ENOUGH_POINTS = 6_000
 """So many points show where any mesh should open. camelhead (22,704 faces) comes to an energy of
 4.30 with them in 20 s of processor time, to 4.39 with 20,000 in 45 s; a fish of 220 faces to 5.38
 in 7 s, to 5.63 in 27 s."""
+STEPPING = 0.9
+"""Share of a time budget after which no step begins: the last one takes time, too."""
+SHARE_UNCUT = 0.2
+"""Share of a time budget in which a map without a cut is sought."""
+LEAST_TIME = 0.01
+"""Seconds that a part has at least, however little time is left."""
 SHARE_OF_SEAM = 0.5
-"""Share of a time budget in which the computed map, which tells the seam, is to be ready."""
+"""Share of the time left then in which the computed map, which tells the seam, is to be ready."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +122,7 @@ class Unwrap:
             method = self
             if self.time_budget is not None:
                 share = max(end - time.monotonic(), 0.0) * len(part.faces) / left
-                method = dataclasses.replace(self, time_budget=max(share, 0.01))
+                method = dataclasses.replace(self, time_budget=max(share, LEAST_TIME))
             maps.append(method.parameterize(part, seed=seed))
             left -= len(part.faces)
         joined = preparation.joined(maps)
@@ -136,14 +142,16 @@ class Unwrap:
             raise UnsupportedError("needs faces; the surface is a point cloud")
         mesh = sound(surface)
         seconds = self.time_budget
-        deadline = math.inf if seconds is None else time.monotonic() + seconds
-        whole = self._uncut(mesh, deadline)
+        begun = time.monotonic()
+        deadline = math.inf if seconds is None else begun + STEPPING * seconds
+        whole = self._uncut(mesh, math.inf if seconds is None else begun + SHARE_UNCUT * seconds)
         if whole is not None and self._needs_no_cut(whole, mesh):
             self._keep_angles(whole)
             report = {**whole.report(), "learned_seam_edges": 0, "computed": "no cut could pay"}
             return Parameterization(whole.uv, whole.mesh.faces, report=report)
         points = self.points or _enough_points(mesh)
-        budget = None if seconds is None else SHARE_OF_SEAM * seconds
+        left = max(deadline - time.monotonic(), LEAST_TIME)
+        budget = None if seconds is None else SHARE_OF_SEAM * left
         computed: dict[str, object]
         try:
             learned = ComputedMap(points, distortion="conformal", time_budget=budget).parameterize(
@@ -165,6 +173,7 @@ class Unwrap:
         if self.price is not None and self.distortion != "conformal":
             if whole is not None and whole.energy <= run.energy + self.price * _length(mesh, seam):
                 run, seam = whole, np.zeros_like(seam)
+                run.deadline = deadline
             run = grown(run, self.price, most_energy=self.max_distortion or np.inf)
             run.improve()
         self._keep_angles(run)
