@@ -266,16 +266,5 @@ def speed(figure: Path | None, race: str | None, seconds: float) -> None:
     print_table(training_table())
 
 
-@main.command()
-@click.argument("cases", nargs=-1)
-@click.option("--points", type=click.IntRange(min=1000), default=50_000, show_default=True)
-def bake(cases: tuple[str, ...], points: int) -> None:
-    """Bake coloured clouds of models, ours and mesh first, and read held-out points back."""
-    from benchmarks.commands.bake import CASES, bakings, table
-    from benchmarks.commands.display import print_table
-
-    print_table(table(list(bakings(cases or CASES, points))))
-
-
 if __name__ == "__main__":
     console.run(main)

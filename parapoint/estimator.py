@@ -98,7 +98,7 @@ class Estimator(ABC):
         """The estimator as a notebook shows it: with a picture of its map, once it is fitted."""
         from parapoint.picturing import html
 
-        return html(self)
+        return html(repr(self), self.mesh() if self.__sklearn_is_fitted__() else None)
 
     def __sklearn_tags__(self) -> Any:
         """What scikit-learn, which alone calls this, has to know: this transforms points."""
@@ -119,7 +119,8 @@ class Estimator(ABC):
         """
         from parapoint.picturing import figure
 
-        return figure(self)
+        points = self.points_
+        return figure(points, self.transform(points), self.seams())
 
     def check(self) -> None:
         """Check the parameters.

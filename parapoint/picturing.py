@@ -11,7 +11,8 @@ import numpy as np
 from PIL import Image
 
 from parapoint.errors import InputError
-from parapoint.surfaces.surface import FloatArray
+from parapoint.surfaces.parameterization import Charted
+from parapoint.surfaces.surface import BoolArray, FloatArray
 from parapoint.textures.checkerboard import checkerboard
 from parapoint.textures.placing import Placing
 from parapoint.textures.preview import preview
@@ -19,32 +20,33 @@ from parapoint.textures.preview import preview
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from parapoint.estimator import Estimator
-
 THUMBNAIL = (480, 160)
 """Width and height in pixels of the picture in a notebook."""
 MOST_DRAWN = 20_000
 """Points that a figure draws at most."""
 
 
-def figure(model: Estimator) -> Figure:
-    """A figure with the fitted points on the left, and their map on the right.
+def figure(points: FloatArray, uv: FloatArray, on_seam: BoolArray) -> Figure:
+    """A figure with points on the left, and their map on the right.
 
     A point has the same colour on both sides, and points on a seam are black. Its axes and their
     collections are matplotlib's own: change what you like.
 
+    Args:
+        points: (N, 3) points; some of them are drawn if there are more than MOST_DRAWN.
+        uv: (N, 2) their images.
+        on_seam: (N,) whether each lies on a seam.
+
     Raises:
-        NotFittedError: the model is not fitted.
         InputError: matplotlib is not installed.
     """
-    points = model.points_
     try:
         from matplotlib.figure import Figure
     except ModuleNotFoundError:
         raise InputError("a plot needs matplotlib: pip install matplotlib") from None
-    points = points[:: len(points) // MOST_DRAWN + 1]
-    uv, seam = model.transform(points), model.seams(points)
-    colours = np.where(seam[:, None], 0.0, _hues(uv))
+    drawn = slice(None, None, len(points) // MOST_DRAWN + 1)
+    points, uv = points[drawn], uv[drawn]
+    colours = np.where(on_seam[drawn, None], 0.0, _hues(uv))
     made = Figure(figsize=(9, 4.5), layout="constrained")
     space = made.add_subplot(1, 2, 1, projection="3d")
     space.scatter(points[:, 0], points[:, 1], points[:, 2], c=colours, s=2)
@@ -66,12 +68,11 @@ def _hues(uv: FloatArray) -> FloatArray:
     return np.asarray(np.clip(hues, 0, 1))
 
 
-def html(model: Estimator) -> str:
-    """The parameters of an estimator, and below them a picture of its map if it is fitted."""
-    said = f"<code>{markup.escape(repr(model))}</code>"
-    if not model.__sklearn_is_fitted__():
+def html(text: str, charted: Charted | None) -> str:
+    """A text as code, and below it a picture of a mesh and its map, if there is one."""
+    said = f"<code>{markup.escape(text)}</code>"
+    if charted is None:
         return said
-    charted = model.mesh()
     shown = preview(Placing.smallest(charted.map.uv).of(charted), checkerboard())
     file = io.BytesIO()
     Image.fromarray(shown).resize(THUMBNAIL, Image.Resampling.LANCZOS).save(file, "PNG")

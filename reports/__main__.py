@@ -1,4 +1,4 @@
-"""`python -m reports DIR`: tables, figures and a page from a results folder, in DIR/report."""
+"""`python -m reports DIR`: a report; `python -m reports site | markdown`: the reference ones."""
 
 from __future__ import annotations
 
@@ -8,27 +8,44 @@ import click
 
 from benchmarks.running.environment import cores
 from parapoint import __version__, console
+from parapoint.commands.memory import memory_option
+
+PATH = click.Path(path_type=Path)
 
 
-@click.command(
-    no_args_is_help=True,
-    context_settings={"help_option_names": ["-h", "--help"]},
+class _WithReport(click.Group):
+    """A group whose command `report` needs no name: `python -m reports DIR`."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        own = {*self.commands, *ctx.help_option_names, "--version"}
+        if args and args[0] not in own:
+            args.insert(0, "report")
+        return super().parse_args(ctx, args)
+
+
+@click.group(cls=_WithReport, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="parapoint reports")
+def main() -> None:
+    """Tables, figures and pages from results folders: `python -m reports DIR` writes DIR/report."""
+
+
+@main.command(
     help=(
         "Write tables, figures and index.html for the results in DIR to DIR/report. With "
         "--against, write what moved since OTHER to DIR/report/history instead."
     ),
 )
-@click.version_option(__version__, prog_name="parapoint reports")
-@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.argument("folder", metavar="DIR", type=PATH)
 @click.option("--exports", is_flag=True, help="Every map as a textured OBJ and GLB, too.")
 @click.option(
     "--against",
     metavar="OTHER",
     multiple=True,
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="An earlier results folder, or another machine's; may be given several times.",
 )
-def main(folder: Path, exports: bool, against: tuple[Path, ...]) -> None:
+@memory_option
+def report(folder: Path, exports: bool, against: tuple[Path, ...]) -> None:
     """Write the report, or the comparisons, and say where they are."""
     if against:
         from reports.history import pages
@@ -40,6 +57,32 @@ def main(folder: Path, exports: bool, against: tuple[Path, ...]) -> None:
     from reports.report import write
 
     print(write(folder, jobs=cores(), textured=exports, progress=Shown()))
+
+
+@main.command()
+@click.argument("sources", metavar="DIR...", nargs=-1, required=True, type=PATH)
+@click.option("--out", default="site", show_default=True, type=PATH, help="Folder of the site.")
+def site(sources: tuple[Path, ...], out: Path) -> None:
+    """Write the static site of results folders or archives, the oldest first.
+
+    Of a cell in several, the newest is shown; the history says what moved.
+    """
+    from reports.progress import Shown
+    from reports.site import building
+
+    built = building.build(sources, out, jobs=cores(), progress=Shown())
+    print(f"{built.index}: {built.cells} cells, {built.size / 1e6:.1f} MB")
+    building.check_size(built)
+
+
+@main.command()
+@click.argument("sources", metavar="DIR...", nargs=-1, required=True, type=PATH)
+@click.option("--out", default="docs/RESULTS.md", show_default=True, type=PATH)
+def markdown(sources: tuple[Path, ...], out: Path) -> None:
+    """Write the results of some folders as one page of Markdown, with commit, machine and load."""
+    from reports.site.markdown import write
+
+    print(write(sources, out))
 
 
 if __name__ == "__main__":

@@ -51,6 +51,7 @@ DISPLAY: dict[str, tuple[str, str]] = {
     "meshlab_triangles": ("MeshLab triangles", "a chart for each face"),
     "external": ("External", ""),
     "meshed": ("Meshed", ""),
+    "textured": ("Textured", ""),
     "fam": ("FAM", ""),
     "artist+slim": ("Artist's cut + SLIM", ""),
     "automatic+slim": ("Automatic cut + SLIM", ""),

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from benchmarks.running.scratch import MARK
 from parapoint.errors import InputError
+from reports import citing
 from reports.contents import contents
 from reports.page import pages as page
 from reports.page.sections import Section
@@ -21,9 +22,9 @@ def write(folder: Path, *, jobs: int, textured: bool = False, progress: Progress
     """Write the report on the results in `folder` to `folder`/report; the path of its index.
 
     report/tables/SUITE/*.tex, .md, .csv; report/figures/SUITE/*.pdf, .png, captions.md and
-    pictures/; report/index.html, report/models/SUITE/MODEL.html and what they share in
-    report/assets/; if `textured`, report/exports/SUITE/MODEL/*.obj, .mtl, .png, .glb. What has
-    not changed is not drawn again. `progress` hears how it goes.
+    pictures/; report/methods.bib; report/index.html, report/models/SUITE/MODEL.html and what they
+    share in report/assets/; if `textured`, report/exports/SUITE/MODEL/*.obj, .mtl, .png, .glb.
+    What has not changed is not drawn again. `progress` hears how it goes.
 
     Raises:
         InputError: the folder is missing, holds no results, or is of a newer version; something
@@ -32,7 +33,7 @@ def write(folder: Path, *, jobs: int, textured: bool = False, progress: Progress
     report = folder / "report"
     sections = []
     suites = contents(folder)
-    _claim(report)
+    claim(report)
     for suite in suites:
         made = tables.tables(suite)
         name = slug(suite.suite)
@@ -42,12 +43,13 @@ def write(folder: Path, *, jobs: int, textured: bool = False, progress: Progress
         drawn = figures.draw(suite, drawn_in / "pictures", drawn_in, jobs, progress)
         if textured:
             faults += exports.write(suite, report, progress)
-        sections.append(Section(report, suite, made, drawn, faults))
-    return page.write(report, folder, sections)
+        sections.append(Section(report, suite, made, drawn, faults, folder))
+    citing.write(report, suites)
+    return page.write(report, str(folder), sections)
 
 
-def _claim(report: Path) -> None:
-    """Make the folder of a report, marked as ours.
+def claim(report: Path) -> None:
+    """Make the folder of a report or a site, marked as ours.
 
     Raises:
         InputError: there is something that is not ours.

@@ -30,6 +30,7 @@ import platformdirs
 import pooch
 
 from benchmarks.cases.builtin import BUILTIN, sampled
+from benchmarks.cases.coloured import WAVES, coloured
 from parapoint.errors import InputError
 from parapoint.files.reading import FORMATS, read_parameterized, read_surface
 from parapoint.surfaces.parameterization import Parameterization
@@ -180,7 +181,8 @@ def canonical_name(case: str) -> str:
     Args:
         case: a name, the beginning of exactly one name, or a path to a file. If more than one
             fits, a whole name comes first, then a file. "@noise=0.01" or "@uneven" after it stands
-            for a cloud sampled from that model (`benchmarks.cases.builtin.sampled`).
+            for a cloud sampled from that model (`benchmarks.cases.builtin.sampled`), "@smooth" or
+            "@fine" for one with colours (`benchmarks.cases.coloured`).
 
     Raises:
         InputError: no name or file fits, several names begin so, or there is no such sampling.
@@ -210,13 +212,16 @@ def _sampling(how: str) -> dict[str, Any]:
     Raises:
         InputError: the text asks for nothing that there is.
     """
+    if how in WAVES:
+        return {"waves": WAVES[how]}
     if how == "uneven":
         return {"is_uneven": True}
     found = re.fullmatch(r"noise=(\d*\.?\d+)", how)
     if found is None or float(found[1]) > MOST_NOISE:
         raise InputError(
             f"a cloud is sampled from a model by MODEL@noise=0.01 (a fraction of the diagonal, "
-            f"{MOST_NOISE} at most) or MODEL@uneven, not by @{how}"
+            f"{MOST_NOISE} at most), MODEL@uneven, or with colours by MODEL@{' or @'.join(WAVES)}, "
+            f"not by @{how}"
         )
     return {"noise": float(found[1])}
 
@@ -251,6 +256,9 @@ def _sampled(name: str) -> tuple[PointCloud, PointCloud]:
     mesh = load(model)
     if not isinstance(mesh, Mesh):
         raise InputError(f"{model} has no faces to sample; it is a point cloud already")
+    if how in WAVES:
+        cloud = coloured(mesh, WAVES[how])
+        return cloud, cloud
     return sampled(mesh, **_sampling(how))
 
 

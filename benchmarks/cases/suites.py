@@ -8,6 +8,7 @@ import json
 from dataclasses import dataclass
 
 from benchmarks.cases.builtin import BUILTIN
+from benchmarks.cases.coloured import WAVES
 from benchmarks.cases.models import registry
 from parapoint.errors import InputError
 
@@ -66,6 +67,7 @@ MESHED_METHODS = tuple(
     for flattening in ("xatlas", "lscm", "slim")
 )
 SAMPLED_MODELS = ("camelhead", "bunny_i_f10000", "cowhead_bff", "fairing-cross")
+COLOURED_MODELS = ("spot_c3d", "max_planck_i_f8000", "camelhead", "fertility")
 SAMPLINGS = ("noise=0", "noise=0.005", "noise=0.01", "uneven")
 
 PAPER_CASES = (
@@ -157,6 +159,19 @@ SUITES: dict[str, Suite] = {
             "Clouds sampled from disks: noise in fractions of the diagonal, uneven density",
             tuple(f"{model}@{how}" for model in SAMPLED_MODELS for how in SAMPLINGS),
             (*MESHED_METHODS, COMPUTED, PAPER),
+        ),
+        Suite(
+            "bake",
+            "Coloured clouds as textured meshes: colours of held-out points read back",
+            (
+                *(f"{model}@{colours}" for model in COLOURED_MODELS for colours in WAVES),
+                "milk",
+                "simple",
+            ),
+            tuple(
+                f"textured(pipeline={pipeline})"
+                for pipeline in ("computed", "poisson", "ball_pivoting")
+            ),
         ),
         Suite(
             "cuts",

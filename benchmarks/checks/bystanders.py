@@ -84,18 +84,18 @@ def undisturbed(folder: Path, *, count: int, seed: int) -> Count:
     """
     draw = random.Random(seed)  # noqa: S311  no secret
     found = Count(0, 0, 0, [])
-    given = _inputs(folder / "inputs")
+    given = inputs(folder / "inputs")
     for number in range(count):
         place = folder / f"run{number}"
         places = {"folder": place / "mine", "results": place / "results", **given}
         shutil.copytree(folder / "inputs" / "results", places["results"])
         for below in (places["folder"], places["results"]):
             _fill(below, draw)
-        before = dict(_hashes(place))
-        before |= dict(_hashes(folder / "inputs"))
+        before = dict(hashes(place))
+        before |= dict(hashes(folder / "inputs"))
         command = draw.choice(COMMANDS).format(**places)
         status = _status(command, place)
-        now = dict(_hashes(place)) | dict(_hashes(folder / "inputs"))
+        now = dict(hashes(place)) | dict(hashes(folder / "inputs"))
         ours = _ours(places["results"])
         for path, content in before.items():
             if path not in ours and now.get(path) != content:
@@ -110,7 +110,7 @@ def undisturbed(folder: Path, *, count: int, seed: int) -> Count:
     return found
 
 
-def _inputs(folder: Path) -> dict[str, Path]:
+def inputs(folder: Path) -> dict[str, Path]:
     """A mesh, a cloud, a model fitted to it and a folder of results, made by our own commands."""
     folder.mkdir(parents=True)
     mesh, rng = irregular_disk(), np.random.default_rng(0)
@@ -146,7 +146,7 @@ def _ours(results: Path) -> set[Path]:
     return {results / name for name in names}
 
 
-def _hashes(folder: Path) -> Iterator[tuple[Path, str]]:
+def hashes(folder: Path) -> Iterator[tuple[Path, str]]:
     """Each file below a folder with the hash of its content."""
     for path in folder.rglob("*"):
         if path.is_file():
@@ -155,15 +155,19 @@ def _hashes(folder: Path) -> Iterator[tuple[Path, str]]:
 
 def _status(command: str, folder: Path) -> int:
     """Run a command in a folder and return its exit status."""
-    program, *arguments = command.split()
-    code = "from parapoint.cli import main; main()"
-    start = ["-c", code] if program == "parapoint" else ["-m", program]
     root = str(Path(__file__).parents[2])
     done = subprocess.run(  # noqa: S603  our own commands
-        [sys.executable, *start, *arguments],
+        [sys.executable, *arguments(command)],
         cwd=folder,
         env=os.environ | {"PYTHONPATH": root},
         capture_output=True,
         check=False,
     )
     return done.returncode
+
+
+def arguments(command: str) -> list[str]:
+    """What Python is started with to run a command of `COMMANDS`."""
+    program, *given = command.split()
+    code = "from parapoint.cli import main; main()"
+    return [*(["-c", code] if program == "parapoint" else ["-m", program]), *given]

@@ -14,8 +14,9 @@ find that nothing is left to do.
 
 `overhead` runs cells of every method, and prints what each costs beside the time of its method.
 
-`all` repeats kills, faults and commands among a user's files (`benchmarks.checks.bystanders`) until
-a time is over.
+`all` repeats these until a time is over: kills, faults, commands among a user's files
+(`benchmarks.checks.bystanders`); and kills of every kind of process, full and read-only disks, and
+rows with values that no run of ours writes (`benchmarks.checks.hardships`).
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ import psutil
 
 from baselines import registry
 from benchmarks.cases.suites import Suite
-from benchmarks.checks import faulty, instant
+from benchmarks.checks import faulty, hardships, instant
 from benchmarks.checks.bystanders import undisturbed
 from benchmarks.running import planning, runner
 from benchmarks.store import measuring, verifying
@@ -252,15 +253,21 @@ def all_(ctx: click.Context, minutes: float, seed: int) -> None:
             killed = toll(suite, folder, count=20, seed=seed + rounds)
             wrong = saved(folder / "faulty", folder / "wrong", 1)
             found = undisturbed(folder / "bystanders", count=10, seed=seed + rounds)
-        for fault in found.faults:
+            ended = hardships.kills(folder / "kills", seed=seed + rounds)
+            disks = hardships.disks(folder / "disks", seed=seed + rounds, count=8)
+            rows = hardships.rows(folder / "rows", seed=seed + rounds, count=2)
+        said = [*found.faults, *ended.faults, *disks.faults, *rows.faults]
+        for fault in said:
             print(fault)
         rounds += 1
-        total += killed.faults + wrong.faults + len(found.faults)
+        total += killed.faults + wrong.faults + len(said)
         print(
             f"round {rounds}: {killed.kills} kills after {killed.reported} rows, "
             f"{wrong.reported} cells of which {2 * len(faulty.FAULTS)} went wrong, "
-            f"{found.runs} commands ({found.refused} refused) among {found.files} files; "
-            f"faults so far: {total}",
+            f"{found.runs} commands ({found.refused} refused) among {found.files} files, "
+            f"{ended.tried} kills of {', '.join(hardships.VICTIMS)} and what they had started, "
+            f"{disks.tried} commands on full or read-only disks, "
+            f"{rows.tried} commands on evil rows; faults so far: {total}",
             flush=True,
         )
     if total:

@@ -204,9 +204,11 @@ class Faulty:
 
     Attributes:
         fault: how; one of FAULTS.
+        seconds: how long it sleeps when that is done.
     """
 
     fault: str = "segfault"
+    seconds: float = 0.0
 
     requires: ClassVar[frozenset[str]] = frozenset({"faces"})
 
@@ -214,4 +216,5 @@ class Faulty:
         """Go wrong."""
         assert isinstance(surface, Mesh)
         FAULTS[self.fault][0]()
+        time.sleep(self.seconds)
         return Parameterization(surface.vertices[:, :2], surface.faces)

@@ -26,6 +26,7 @@ from benchmarks.checks import wild_clouds
 from benchmarks.checks.wild_case import POINTS, SEED, Case, cannot_be_told, shows
 from benchmarks.metrics.evaluation import evaluate
 from parapoint import console
+from parapoint.commands.mesh_output import mesh_output
 from parapoint.commands.unwrapping import Request, unwrap_mesh
 from parapoint.errors import InputError
 from parapoint.files.reading import Polygons, read_parameterized, read_polygons
@@ -288,7 +289,8 @@ def _is_written(path: Path, ending: str, faces: int, area: float) -> bool:
     assert isinstance(given, Polygons)
     registry.method("slim")[1].parameterize(given.mesh, seed=SEED)
     out = path.with_name(f"{path.stem}_out{ending}")
-    unwrap_mesh(given, Request(str(path), str(out), 256, BORDER, Unwrap(), SEED))
+    output = mesh_output(given, str(path), str(out), 256, 1)
+    unwrap_mesh(given.mesh, Request(Unwrap(), BORDER, SEED), output)
     turned = evaluate(*read_parameterized(out))["mirrored_area_fraction"]
     return turned == 0 and _faces_up(out, faces, area)
 

@@ -119,6 +119,32 @@ def methods() -> Table:
     return table
 
 
+def about(method: str) -> list[str]:
+    """What there is to say of a method, line by line; nothing of one that is not installed here."""
+    from baselines import registry
+
+    try:
+        found = registry.describe(registry.RENAMED.get(method, method))
+    except (ImportError, InputError):
+        return []
+    needs = ", ".join(found.requires) or "nothing"
+    return [
+        found.summary,
+        f"Needs: {needs}. The same map for the same seed: {found.deterministic}.",
+        *([f"Licence: {found.licence}."] if found.licence else []),
+    ]
+
+
+def credit(method: str) -> tuple[str, tuple[str, ...]]:
+    """Licence and BibTeX entries of a method; nothing of one that is not known here."""
+    from baselines import registry
+
+    try:
+        return registry.credit(registry.RENAMED.get(method, method))
+    except (ImportError, InputError):
+        return "", ()
+
+
 def metrics() -> Table:
     """Each metric with its unit, direction and source."""
     from benchmarks.metrics.table import METRICS

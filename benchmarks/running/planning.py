@@ -139,9 +139,11 @@ def surfaces(store: Store, cases: Sequence[str]) -> tuple[dict[str, str], dict[s
     before = dict(known)
     for case in cases:
         origin = _origin(case, readers)
-        if origin in known:
+        if origin in known and store.is_whole(known[origin]):
             hashes[case] = known[origin]
             continue
+        if origin in known:
+            store.forget(known[origin])
         try:
             surface = models.load(case)
         except InputError as error:
@@ -170,8 +172,7 @@ def mend(store: Store, planned: Sequence[Cell]) -> None:
     for case, surface_hash in dict.fromkeys((row.case, row.surface_hash) for row in cells):
         if store.is_whole(surface_hash):
             continue
-        for path in store.paths_of(surface_hash):
-            path.unlink(missing_ok=True)  # ours: its name is the hash, and its content is not
+        store.forget(surface_hash)
         surfaces(store, [case])
 
 

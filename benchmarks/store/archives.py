@@ -23,6 +23,8 @@ from parapoint.files.decoding import check_archive
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization, TracePoint
 from parapoint.surfaces.surface import Mesh, PointCloud, Surface
 
+SEAL = "content_sha256"
+"""The name under which a sealed npz file carries the hash of its other arrays."""
 HASH = re.compile(r"[0-9a-f]{8,64}")
 """What a hash, and so the name of a file in the store, looks like."""
 Arrays = Mapping[str, npt.NDArray[Any]]
@@ -46,9 +48,12 @@ def surface_arrays(surface: Surface) -> dict[str, npt.NDArray[Any]]:
     """The arrays that make up `surface`."""
     if isinstance(surface, Mesh):
         return {"vertices": surface.vertices, "faces": surface.faces}
-    if surface.normals is None:
-        return {"points": surface.points}
-    return {"points": surface.points, "normals": surface.normals}
+    arrays = {"points": surface.points}
+    if surface.normals is not None:
+        arrays["normals"] = surface.normals
+    if "colours" in surface.attributes:
+        arrays["colours"] = surface.attributes["colours"]
+    return arrays
 
 
 def map_arrays(result: Parameterization | PointParameterization) -> dict[str, npt.NDArray[Any]]:
@@ -97,8 +102,16 @@ def _trace(arrays: Arrays) -> tuple[TracePoint, ...]:
     )
 
 
-def write_arrays(path: Path, arrays: Arrays) -> None:
-    """Write `arrays` to the npz file `path`: all of it or nothing, and onto the disk."""
+def write_arrays(path: Path, arrays: Arrays, *, sealed: bool = False) -> None:
+    """Write `arrays` to the npz file `path`: all of it or nothing, and onto the disk.
+
+    Args:
+        path: where to.
+        arrays: by name; integers have 64 bits.
+        sealed: also write their hash, for a file whose name is not its own hash.
+    """
+    if sealed:
+        arrays = {**arrays, SEAL: np.array(arrays_hash(arrays))}
     # Indices take up most of a map. 32 bits hold them, which leaves half the bytes to compress.
     small = {
         name: array.astype(np.int32)
@@ -114,7 +127,8 @@ def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
     """The arrays of the npz file `path`; nothing in it is unpickled.
 
     Raises:
-        InputError: the file is missing or damaged, or decodes to more than it may.
+        InputError: the file is missing or damaged, decodes to more than it may, or has a seal that
+            does not fit.
     """
     try:
         # We open the file ourselves, since numpy leaves one open that is not an archive.
@@ -128,10 +142,14 @@ def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
         raise InputError(f"{path}: {error}") from None
     except _DAMAGE as error:
         raise InputError(f"{path}: damaged ({error})") from None
-    return {
+    found = {
         name: array.astype(np.int64) if array.dtype == np.int32 else array
         for name, array in arrays.items()
     }
+    seal = found.pop(SEAL, None)
+    if seal is not None and str(seal) != arrays_hash(found):
+        raise InputError(f"{path}: damaged (its content does not fit its hash)")
+    return found
 
 
 @contextlib.contextmanager
@@ -188,7 +206,8 @@ def read_surface(path: Path) -> Surface:
     try:
         if "faces" in arrays:
             return Mesh(arrays["vertices"], arrays["faces"])
-        return PointCloud(arrays["points"], arrays.get("normals"))
+        attributes = {name: arrays[name] for name in ("colours",) if name in arrays}
+        return PointCloud(arrays["points"], arrays.get("normals"), attributes=attributes)
     except (InputError, KeyError) as error:
         raise InputError(f"{path}: damaged ({error})") from None
 

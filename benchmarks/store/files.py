@@ -67,7 +67,11 @@ class Files:
         """
         if not row.surface_hash:
             raise InputError(f"{row.case}: no surface is stored ({row.reason})")
-        return read_surface(self.surface_path(row.surface_hash))
+        path = self.surface_path(row.surface_hash)
+        surface = read_surface(path)
+        if not arrays_hash(surface_arrays(surface)).startswith(row.surface_hash):
+            raise InputError(f"{path}: damaged (its content does not fit its name)")
+        return surface
 
     def result(self, row: ResultRow) -> Parameterization | PointParameterization:
         """The map of a row that ended ok, with its trace and report.
@@ -77,7 +81,11 @@ class Files:
         """
         if not row.uv_sha256:
             raise InputError(f"{row.case}, {row.method}: no map is stored ({row.status})")
-        return read_map(self.uv_path(row.id), row.report)
+        path = self.uv_path(row.id)
+        result = read_map(path, row.report)
+        if arrays_hash(map_arrays(result)) != row.uv_sha256:
+            raise InputError(f"{path}: is not the map that was written")
+        return result
 
     def reference(self, row: ResultRow) -> Parameterization | None:
         """The map that the row's model came with; None if it came with none.
@@ -90,7 +98,7 @@ class Files:
         return reference if isinstance(reference, Parameterization) else None
 
     def add_surface(self, surface: Surface) -> str:
-        """Store a surface unless it is there already; its hash.
+        """Store a surface unless it is there already, whole; its hash.
 
         Raises:
             InputError: the disk is full, here and in the methods below.
@@ -99,6 +107,8 @@ class Files:
         name = arrays_hash(arrays)[:32]
         path = self.surface_path(name)
         with disk_said(path):
+            if path.exists() and not self.is_whole(name):
+                self.forget(name)
             if not path.exists():
                 write_arrays(path, arrays)
         return name
@@ -108,14 +118,14 @@ class Files:
         path = self.reference_path(surface_hash)
         with disk_said(path):
             if not path.exists():
-                write_arrays(path, map_arrays(reference))
+                write_arrays(path, map_arrays(reference), sealed=True)
 
     def add_exact(self, surface_hash: str, cloud: PointCloud) -> None:
         """Store the points of a noisy cloud without their noise, unless they are there already."""
         path = self.exact_path(surface_hash)
         with disk_said(path):
             if not path.exists():
-                write_arrays(path, surface_arrays(cloud))
+                write_arrays(path, surface_arrays(cloud), sealed=True)
 
     def paths_of(self, surface_hash: str) -> list[Path]:
         """The files that may be stored of a surface."""
@@ -132,6 +142,11 @@ class Files:
         except InputError:
             return False
         return arrays_hash(content).startswith(surface_hash)
+
+    def forget(self, surface_hash: str) -> None:
+        """Remove the files of a surface, which are ours: their names are its hash."""
+        for path in self.paths_of(surface_hash):
+            path.unlink(missing_ok=True)
 
     def add_map(self, row_id: str, path: Path) -> None:
         """Move the map file `path`, which lies on the same disk, to its place.

@@ -29,6 +29,8 @@ IDENTITY_COLUMNS = ("suite", "case", "method", "params", "seed", "status")
 """The first columns of the table."""
 KEY_COLUMNS = ("id", "metrics_key")
 """The last columns of the table."""
+DAMAGED = " damaged"
+"""Ends the key of a row whose files could not be read, so that the next time tries it again."""
 _log = logging.getLogger("parapoint")
 
 
@@ -62,6 +64,8 @@ def metrics(
         else:
             given = (measured_elsewhere or {}).get(row.id)
             values = row_metrics(store, row) if given is None else dict(given)
+            if given is None and row.uv_sha256 and not values:
+                key += DAMAGED
         names = (_encodable(name) for name in (row.suite, row.case, row.method))
         cell = (*names, json.dumps(row.params), row.seed, row.status)
         start = dict(zip(IDENTITY_COLUMNS, cell, strict=True))

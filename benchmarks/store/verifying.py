@@ -5,7 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from benchmarks.store.archives import arrays_hash, map_arrays, read_surface, surface_arrays
+from benchmarks.store.archives import (
+    arrays_hash,
+    map_arrays,
+    read_arrays,
+    read_map,
+    read_surface,
+    surface_arrays,
+)
 from benchmarks.store.measuring import metrics_keys, row_metrics, stored_table, values_by_key
 from benchmarks.store.results import Store
 from benchmarks.store.rows import IDENTITY, ResultRow, identity, row_of
@@ -44,6 +51,12 @@ def file_faults(store: Store, rows: Sequence[ResultRow]) -> Iterator[str]:
             continue
         if arrays_hash(surface_arrays(surface))[: len(surface_hash)] != surface_hash:
             yield f"{store.surface_path(surface_hash)}: its content does not fit its name"
+        for path in store.paths_of(surface_hash)[1:]:
+            if path.exists():
+                try:
+                    read_arrays(path)
+                except InputError as error:
+                    yield str(error)
         sizes[surface_hash] = len(surface.faces if isinstance(surface, Mesh) else surface.points)
     for row in rows:
         for fault in _row_faults(store, row, sizes.get(row.surface_hash)):
@@ -57,7 +70,7 @@ def _row_faults(store: Store, row: ResultRow, size: int | None) -> Iterator[str]
     if row.status != "ok":
         return
     try:
-        result = store.result(row)
+        result = read_map(store.uv_path(row.id))
     except InputError as error:
         yield str(error)
         return

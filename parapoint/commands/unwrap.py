@@ -13,8 +13,9 @@ from parapoint.commands.output import TEXTURE, preview_target, target, write
 from parapoint.errors import InputError
 from parapoint.files.reading import Polygons, read_polygons
 from parapoint.parameters import check_choice
-from parapoint.surfaces.components import COMPONENTS, components
-from parapoint.textures.baking import check_size
+from parapoint.surfaces.components import COMPONENTS, components, largest_component
+from parapoint.textures.baking import MARGIN, check_size
+from parapoint.textures.placing import BORDER
 
 
 @click.command(no_args_is_help=True, options_metavar="[OPTIONS] --out FILE")
@@ -32,6 +33,11 @@ from parapoint.textures.baking import check_size
     default="together",
     show_default=True,
     help="One map of all, or of each or the largest component.",
+)
+@click.option(
+    "--distortion",
+    metavar="D",
+    help="conformal, balanced (default of a cloud) or isometric (of a mesh).",
 )
 @click.option("--seam-price", type=float, metavar="P", help="Energy a branch must gain a length.")
 @click.option("--max-distortion", type=float, metavar="E", help="Cut on until the energy is E.")
@@ -55,6 +61,7 @@ def unwrap(
     as_json: bool,
     seams: str | None,
     per_vertex: bool,
+    distortion: str | None,
     seam_price: float | None,
     max_distortion: float | None,
     **settings: Any,
@@ -68,6 +75,9 @@ def unwrap(
     least) by --seam-price (1) for a length of the square root of the area; --max-distortion adds
     to them until the energy is as low, within --time-budget.
 
+    --distortion isometric keeps angles and areas alike; balanced keeps angles as far as every part
+    keeps its area; conformal keeps angles alone, whatever becomes of an ear or a finger.
+
     Of a cloud FILE.glb is a mesh of it, with its colours baked into a texture (a checkerboard where
     it has none); so are .obj and .ply with --texture. Without they are its points and their UVs.
     """
@@ -75,39 +85,52 @@ def unwrap(
     check_size(TEXTURE if texture is None else texture, margin or 0)
     picture = None if preview is None else preview_target(preview, out, surface, force=force)
     given = read_polygons(surface)
+    border = BORDER if margin is None else margin / (texture or TEXTURE)
     if isinstance(given, Polygons):
-        from parapoint.commands.unwrapping import Request, border_of, lines, unwrap_mesh
+        from parapoint.commands.mesh_output import mesh_output
+        from parapoint.commands.unwrapping import Request, lines, unwrap_mesh
         from parapoint.unwrapping.unwrap import Unwrap
 
         check_choice("components", settings["components"], COMPONENTS)
-        grown = {"--seam-price": seam_price, "--max-distortion": max_distortion}
+        grown: dict[str, object] = {
+            "--seam-price": seam_price,
+            "--max-distortion": max_distortion,
+            "--distortion": distortion,
+        }
         grown["--components largest"] = settings["components"] == "largest" or None
         for option, given_value in grown.items():
             if seams is not None and given_value is not None:
                 raise InputError(f"{option} does not go with --seams, which are cut as they are")
-        request = Request(
+        if seam_price is not None and distortion == "conformal":
+            raise InputError("--seam-price does not go with --distortion conformal")
+        method = Unwrap(
+            time_budget=settings["time_budget"],
+            price=Unwrap.price if seam_price is None else seam_price,
+            max_distortion=max_distortion,
+            distortion=distortion or Unwrap.distortion,
+        )
+        mesh, chosen = given.mesh, None
+        if settings["components"] == "largest" and mesh.component_count > 1:
+            mesh, chosen = largest_component(mesh)
+        output = mesh_output(
+            given,
             surface,
             out,
-            texture or TEXTURE,
-            border_of(margin, texture or TEXTURE),
-            Unwrap(
-                time_budget=settings["time_budget"],
-                price=Unwrap.price if seam_price is None else seam_price,
-                max_distortion=max_distortion,
-            ),
-            settings["seed"],
-            seams,
-            settings["components"] == "largest",
-            per_vertex,
-            picture,
+            texture,
+            MARGIN if margin is None else margin,
+            chosen=chosen,
+            per_vertex=per_vertex,
         )
-        facts = unwrap_mesh(given, request)
+        output.check(force=force)
+        request = Request(method, border, settings["seed"], seams, picture)
+        facts = unwrap_mesh(mesh, request, output)
         print(json.dumps(facts) if as_json else lines(facts))
         return
     unused = {"--seams": seams, "--seam-price": seam_price, "--max-distortion": max_distortion}
     for option, value in {**unused, "--per-vertex": per_vertex or None}.items():
         if value is not None:
             raise InputError(f"{option} is for meshes; {surface} is a point cloud")
+    settings["distortion"] = distortion
     model = fitted(surface, given, estimator_of("computed", settings))
     written = components(given)[0] if model.components == "largest" else given
     facts = write(model, written, out, texture=texture, margin=margin, preview=picture)

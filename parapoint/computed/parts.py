@@ -60,15 +60,24 @@ def parts_kept(
     run = grown(run, PRICE, most_starved=MOST_STARVED)
     unit, uv = run.mesh, run.uv
     if distortion == "balanced":
-        uv = _towards_conformal(unit, uv, deadline)
+        uv = towards_conformal(unit, uv, deadline)
     return Mesh(size * unit.vertices, unit.faces), size * uv
 
 
-def _towards_conformal(disk: Mesh, uv: FloatArray, deadline: float) -> FloatArray:
-    """The map `uv` (V, 2) moved down the conformal energy until the next move starves a part."""
+def towards_conformal(
+    disk: Mesh, uv: FloatArray, deadline: float, most_starved: float = MOST_STARVED
+) -> FloatArray:
+    """The map `uv` (V, 2) moved down the conformal energy until the next move starves too much.
+
+    Args:
+        disk: the domain, of area 1.
+        uv: (V, 2) a map of it, one to one, of area 1 or so.
+        deadline: no step begins after this time of `time.monotonic`.
+        most_starved: share of the surface that may be starved of area.
+    """
 
     def is_sound(moved: FloatArray) -> bool:
-        return starved_share(disk, moved) <= MOST_STARVED and is_bijective(disk, moved)
+        return starved_share(disk, moved) <= most_starved and is_bijective(disk, moved)
 
     before = math.inf
     for moved in steps_down(disk, uv, igl.CONFORMAL, deadline):

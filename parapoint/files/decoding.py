@@ -60,6 +60,11 @@ def allow(size: float) -> None:
     _allowed.set(max(size, DECODED_LEAST))
 
 
+def allowed() -> float:
+    """Bytes that every file may decode to from here on."""
+    return _allowed.get()
+
+
 def check_decoded(size: int, file_size: int) -> None:
     """Check, before any memory is taken, that a file decodes to no more than it may.
 

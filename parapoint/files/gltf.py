@@ -26,7 +26,7 @@ from parapoint.files.content import (
     welded,
     whole,
 )
-from parapoint.files.decoding import check_decoded
+from parapoint.files.decoding import check_decoded, plain
 from parapoint.surfaces.surface import FloatArray, IntArray
 
 GLTF_TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -38,6 +38,31 @@ APPEARANCE = ("KHR_materials_", "KHR_lights_", "KHR_texture_basisu", "EXT_textur
 
 
 def glb(data: bytes, folder: Path) -> Content:
+    """The content of binary glTF 2; see `gltf`."""
+    return _of_glb(data, folder).content()
+
+
+def gltf(data: bytes, folder: Path) -> Content:
+    """The triangles (or, without any, the points) of a glTF 2 scene, moved to their places.
+
+    glTF splits a vertex wherever a normal or a UV differs, so vertices are welded where their
+    positions are exactly equal: seams of the UV are seams, not boundaries of the mesh. The UV are
+    those of the first set, with v upwards as in OBJ.
+    """
+    return _of_text(data, folder).content()
+
+
+def opened(path: Path) -> Gltf:
+    """The scene in a .glb or .gltf file.
+
+    Raises:
+        InputError, ValueError, KeyError, IndexError, struct.error, TypeError: it is no such file.
+    """
+    of = _of_glb if path.suffix.lower() == ".glb" else _of_text
+    return of(plain(path.read_bytes()), path.parent)
+
+
+def _of_glb(data: bytes, folder: Path) -> Gltf:
     """Binary glTF 2: a header and two chunks, JSON and data."""
     magic, version, _ = struct.unpack_from("<4sII", data)
     if magic != b"glTF" or version != 2:
@@ -50,20 +75,14 @@ def glb(data: bytes, folder: Path) -> Content:
     if len(tail) >= 8:
         size, _ = struct.unpack_from("<I4s", tail)
         chunk = tail[8 : 8 + size]
-    return gltf(data[20 : 20 + length], folder, chunk)
+    return _of_text(data[20 : 20 + length], folder, chunk)
 
 
-def gltf(data: bytes, folder: Path, chunk: bytes = b"") -> Content:
-    """The triangles (or, without any, the points) of a glTF 2 scene, moved to their places.
-
-    glTF splits a vertex wherever a normal or a UV differs, so vertices are welded where their
-    positions are exactly equal: seams of the UV are seams, not boundaries of the mesh. The UV are
-    those of the first set, with v upwards as in OBJ.
-    """
-    return _Gltf(json.loads(data), folder, chunk, len(data) + len(chunk)).content()
+def _of_text(data: bytes, folder: Path, chunk: bytes = b"") -> Gltf:
+    return Gltf(json.loads(data), folder, chunk, len(data) + len(chunk))
 
 
-class _Placed(NamedTuple):
+class Placed(NamedTuple):
     """A primitive where a node of the scene puts it.
 
     Attributes:
@@ -71,16 +90,22 @@ class _Placed(NamedTuple):
         transform: (4, 4) of the node.
         weights: of its morph targets.
         skin: number of the skin whose joints move its vertices, or None.
+        node: the node; None in a file without any.
     """
 
     primitive: dict[str, Any]
     transform: FloatArray
     weights: list[float]
     skin: int | None
+    node: dict[str, Any] | None = None
 
 
-class _Gltf:
-    """One glTF file while it is read."""
+class Gltf:
+    """One glTF file while it is read.
+
+    Attributes:
+        tree: its JSON.
+    """
 
     def __init__(self, tree: Any, folder: Path, chunk: bytes, size: int) -> None:
         if not isinstance(tree, dict) or not tree.get("meshes"):
@@ -96,7 +121,7 @@ class _Gltf:
         self.buffers: dict[str | int, bytes] = {}
         self.world: dict[int, FloatArray] = {}  # (4, 4) transform of each node in the scene
 
-    def _buffer(self, index: int) -> bytes:
+    def buffer(self, index: int) -> bytes:
         """The bytes of a buffer, read once: the file's own chunk, in the text, or a file beside."""
         uri = self.tree["buffers"][index].get("uri")
         key = index if uri is None else uri
@@ -114,13 +139,39 @@ class _Gltf:
             return base64.b64decode(uri.partition(",")[2])
         path = (folder / unquote(uri)).resolve()
         if not path.is_relative_to(folder.resolve()) or not path.is_file():
-            raise InputError(f"its buffer {uri[:80]!r} is not a file beside it")
+            raise InputError(f"{uri[:80]!r} is not a file beside it")
         data = path.read_bytes()
         self.size += len(data)
         return data
 
+    def image(self, index: int) -> bytes:
+        """The bytes of an image file: a piece of a buffer, in the text, or a file beside."""
+        item = self.tree["images"][index]
+        if "bufferView" in item:
+            view = self.tree["bufferViews"][item["bufferView"]]
+            start = view.get("byteOffset", 0)
+            return self.buffer(view["buffer"])[start : start + view["byteLength"]]
+        return self._loaded(1, item["uri"])
+
+    def triangles(self, primitive: dict[str, Any]) -> IntArray:
+        """(F, 3) rows of the vertices of a primitive of mode 4, 5 or 6."""
+        if "indices" in primitive:
+            run = whole(self.accessor(primitive["indices"])).reshape(-1)
+        else:
+            run = np.arange(self.tree["accessors"][primitive["attributes"]["POSITION"]]["count"])
+        return _mode_triangles(primitive.get("mode", 4), run)
+
     def accessor(self, index: int) -> FloatArray | IntArray:
         """(n, width) values; normalized whole numbers become fractions."""
+        array = self.stored(index)
+        if array.dtype.kind == "f":
+            return array.astype(np.float64)
+        if self.tree["accessors"][index].get("normalized"):
+            return np.maximum(array / float(np.iinfo(array.dtype).max), -1.0)
+        return array.astype(np.int64)
+
+    def stored(self, index: int) -> npt.NDArray[Any]:
+        """(n, width) values of an accessor as they are stored."""
         item = self.tree["accessors"][index]
         width = GLTF_WIDTHS[item["type"]]
         if item["count"] < 1:
@@ -139,11 +190,7 @@ class _Gltf:
                 raise InputError("has a sparse accessor with an index out of range")
             array = array.copy()
             array[rows] = self._view(values, item["componentType"], sparse["count"], width)
-        if array.dtype.kind == "f":
-            return array.astype(np.float64)
-        if item.get("normalized"):
-            return np.maximum(array / float(np.iinfo(array.dtype).max), -1.0)
-        return array.astype(np.int64)
+        return array
 
     def _view(
         self, item: dict[str, Any], component: int, count: int, width: int
@@ -153,19 +200,19 @@ class _Gltf:
         kind = np.dtype(GLTF_TYPES[component])
         stride = view.get("byteStride", width * kind.itemsize)
         start = view.get("byteOffset", 0) + item.get("byteOffset", 0)
-        raw = self._buffer(view["buffer"])
+        raw = self.buffer(view["buffer"])
         if count < 1 or start < 0 or stride < width * kind.itemsize:
             raise InputError("has an accessor of impossible size")
         if start + (count - 1) * stride + width * kind.itemsize > len(raw):
             raise InputError("ends early, in a buffer")
         return np.ndarray((count, width), kind, raw, start, (stride, kind.itemsize))
 
-    def placed_primitives(self) -> list[_Placed]:
+    def placed_primitives(self) -> list[Placed]:
         """The primitives of the scene, in order."""
         nodes = self.tree.get("nodes", [])
         if not nodes:
             return [
-                _Placed(primitive, np.eye(4), mesh.get("weights", []), None)
+                Placed(primitive, np.eye(4), mesh.get("weights", []), None)
                 for mesh in self.tree["meshes"]
                 for primitive in mesh["primitives"]
             ]
@@ -176,7 +223,7 @@ class _Gltf:
             if scenes
             else [index for index in range(len(nodes)) if index not in children]
         )
-        placed: list[_Placed] = []
+        placed: list[Placed] = []
         waiting = [(index, np.eye(4)) for index in reversed(roots)]
         visited: set[int] = set()  # nodes form trees; a file in which they do not must not hang
         while waiting:
@@ -193,7 +240,7 @@ class _Gltf:
                 places = [transform @ local for local in self._instances(node)]
                 check_decoded(128 * (len(placed) + len(places) * len(primitives)), self.size)
                 placed += [
-                    _Placed(primitive, place, weights, node.get("skin"))
+                    Placed(primitive, place, weights, node.get("skin"), node)
                     for place in places
                     for primitive in primitives
                 ]
@@ -216,7 +263,7 @@ class _Gltf:
         rows = zip(*given.values(), strict=True)
         return [_node_transform(dict(zip(given, row, strict=True))) for row in rows]
 
-    def _positions(self, placed: _Placed) -> FloatArray:
+    def _positions(self, placed: Placed) -> FloatArray:
         """(n, 3) the vertices of a primitive as the file poses them: morphed, skinned, in place."""
         attributes, transform = placed.primitive["attributes"], placed.transform
         local = np.asarray(self.accessor(attributes["POSITION"]), dtype=np.float64)
@@ -271,12 +318,7 @@ class _Gltf:
                 points.append(place)
             if mode not in {4, 5, 6}:
                 continue
-            run = (
-                whole(self.accessor(primitive["indices"])).reshape(-1)
-                if "indices" in primitive
-                else np.arange(len(place))
-            )
-            turned = _mode_triangles(mode, run)
+            turned = self.triangles(primitive)
             if np.linalg.det(transform[:3, :3]) < 0:  # a mirror image turns the faces round
                 turned = turned[:, ::-1]
             triangles = turned.reshape(-1)

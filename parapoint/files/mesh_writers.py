@@ -27,7 +27,7 @@ def write_obj(
         path: the OBJ file; it appears only when it is complete.
         mesh: the mesh.
         parameterization: its map.
-        texture: (H, W, 3) pixels, first row at the top. With it, a material beside the OBJ
+        texture: (H, W, 3 or 4) pixels, first row at the top. With it, a material beside the OBJ
             (same name, .mtl) shows it (same name, .png).
 
     Raises:
@@ -56,7 +56,7 @@ def write_obj(
 
 def write_material(path: Path, texture: npt.NDArray[np.uint8]) -> str:
     """Write a texture (.png) and its material (.mtl) beside an OBJ file; the lines that use it."""
-    image, library = _texture_beside(path, texture), beside(path, ".mtl")
+    image, library = write_picture(path, texture), beside(path, ".mtl")
     with complete_file(library) as file:
         file.write(sealed_text(f"newmtl map\nKd 1 1 1\nmap_Kd {image.name}\n"))
     return f"mtllib {library.name}\nusemtl map\n"
@@ -80,8 +80,8 @@ def write_textured(path: str | Path, charted: Charted, texture: npt.NDArray[np.u
         raise InputError(f"{path}: a textured mesh is written as .obj, .glb or .ply")
 
 
-def _texture_beside(path: Path, texture: npt.NDArray[np.uint8]) -> Path:
-    """Write the texture beside `path`; the file."""
+def write_picture(path: Path, texture: npt.NDArray[np.uint8 | np.uint16]) -> Path:
+    """Write a texture beside a file, under its name; the file."""
     image = beside(path, ".png")
     pixels = sealed_png(png(texture))
     with complete_file(image) as file:
@@ -174,7 +174,7 @@ def write_ply(
     path = Path(path)
     named = []
     if texture is not None:
-        named = [f"comment TextureFile {_texture_beside(path, texture).name}"]
+        named = [f"comment TextureFile {write_picture(path, texture).name}"]
     split = _Split.of(charted)
     header = [
         "ply",

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from parapoint.files.decoding import plain
-from parapoint.files.targets import complete_file
+from parapoint.files.mesh_writers import write_picture
+from parapoint.files.polygons import corner_rows
+from parapoint.files.targets import beside, complete_file, sealed_text
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import IntArray
 
-TEXTURED = re.compile(rb"^\s*(map_|bump|disp|decal|norm|refl)", re.MULTILINE | re.IGNORECASE)
-"""Lines of a material library that name a picture."""
+OF_PICTURE = re.compile(r"^\s*(map_\w+|bump|disp|decal|norm|refl)\b", re.IGNORECASE)
+"""The word that begins a line of a material library which names a picture."""
+
+logger = logging.getLogger("parapoint")
 
 
 def libraries(source: Path) -> tuple[list[Path], bool]:
@@ -24,9 +31,44 @@ def libraries(source: Path) -> tuple[list[Path], bool]:
     for line in _lines(plain(source.read_bytes())):
         words = line.split(None, 1)
         if len(words) == 2 and words[0] == b"mtllib":
-            found.append(source.parent / words[1].strip().decode(errors="replace"))
-    pictures = any(TEXTURED.search(path.read_bytes()) for path in found if path.is_file())
-    return found, pictures
+            found.append(source.parent / words[1].strip().decode(errors="surrogateescape"))
+    return found, any(OF_PICTURE.match(line) for path in found for line in _library_lines(path))
+
+
+def write_library(out: Path, texture: npt.NDArray[Any] | None, given: list[Path]) -> str:
+    """Write the materials of libraries beside an OBJ file, with one texture of all their colours.
+
+    The texture stands for all pictures of colours (map_Kd). Other pictures, which were drawn for
+    other UVs, are left out, and a warning names their kinds; without a texture so are all.
+
+    Returns:
+        The line of the OBJ file that names the new library.
+    """
+    library = beside(out, ".mtl")
+    image = "" if texture is None else write_picture(out, texture).name
+    kept, left = [], set()
+    for line in (line for path in given for line in _library_lines(path)):
+        word = OF_PICTURE.match(line)
+        if word is None:
+            kept.append(line)
+        elif image and word[1].lower() == "map_kd":
+            kept.append(f"map_Kd {image}")
+        else:
+            left.add(word[1])
+    if left:
+        logger.warning(
+            "%s: pictures that were drawn for the old UVs are left out: %s",
+            library,
+            ", ".join(sorted(left)),
+        )
+    with complete_file(library) as file:
+        file.write(sealed_text("".join(f"{line}\n" for line in kept)))
+    return f"mtllib {library.name}\n"
+
+
+def _library_lines(path: Path) -> list[str]:
+    """The lines of a material library; none where the file is missing."""
+    return path.read_bytes().decode(errors="replace").splitlines() if path.is_file() else []
 
 
 def rewrite_obj(
@@ -54,9 +96,7 @@ def rewrite_obj(
     Returns:
         The number of polygons that became triangles.
     """
-    row = np.full(int(places.max()) + 1, -1, dtype=np.int64)
-    row[places] = parameterization.corners
-    is_split = (row[places] != parameterization.corners).any(axis=1)
+    row, is_split = corner_rows(places, parameterization.corners)
     triangles_of: dict[int, list[int]] = {}
     for triangle, place in enumerate(places.min(axis=1).tolist()):
         triangles_of.setdefault(place, []).append(triangle)

@@ -79,8 +79,100 @@ class _Body:
         return lambda at: int(code.unpack_from(self.raw, at)[0])
 
 
-def ply(data: bytes) -> Content:
-    """PLY, text or binary of either byte order: polygons and triangle strips, vertex normals."""
+@dataclass
+class Column:
+    """A property of all rows of an element.
+
+    Attributes:
+        values: (N,) of scalars; of lists, all values in one run.
+        sizes: (N,) how many values each list has; None for scalars.
+    """
+
+    values: npt.NDArray[Any]
+    sizes: IntArray | None = None
+
+    @property
+    def longest(self) -> int:
+        """Values of the longest list; 0 for scalars."""
+        return 0 if self.sizes is None else int(self.sizes.max(initial=0))
+
+    def rows(self, chosen: IntArray) -> Column:
+        """Some rows."""
+        if self.sizes is None:
+            return Column(self.values[chosen])
+        starts = np.cumsum(self.sizes) - self.sizes
+        return Column(self.values[ranges(starts[chosen], self.sizes[chosen])], self.sizes[chosen])
+
+
+@dataclass
+class Table:
+    """An element of a PLY file: its name, the number of its rows, and its properties."""
+
+    name: str
+    count: int
+    columns: dict[str, Column]
+
+    def rows(self, chosen: IntArray) -> Table:
+        """Some rows."""
+        columns = {name: column.rows(chosen) for name, column in self.columns.items()}
+        return Table(self.name, len(chosen), columns)
+
+
+def opened(data: bytes) -> tuple[list[str], list[Table]]:
+    """The comments of a PLY file, and its elements, whatever they are."""
+    elements, body = _parts(data)
+    header = data.partition(b"end_header")[0].decode("latin-1").splitlines()
+    comments = [line.partition(" ")[2] for line in header if line.startswith("comment ")]
+    at = 0
+    tables = []
+    for name, count, properties in elements:
+        columns, at = _columns(body, at, count, properties)
+        kinds = zip(properties, columns, strict=True)
+        named = {
+            item.name: Column(values.astype(item.type.newbyteorder("=")), sizes)
+            for item, (values, sizes) in kinds
+        }
+        tables.append(Table(name, count, named))
+    return comments, tables
+
+
+def _columns(
+    body: _Body, at: int, count: int, properties: list[_Property]
+) -> tuple[list[tuple[FloatArray, IntArray | None]], int]:
+    """Values and sizes of each property, and the unit behind the element."""
+    starts = np.zeros((count, len(properties)), dtype=np.int64)
+    sizes = np.ones((count, len(properties)), dtype=np.int64)
+    widths = np.array([body.width(item.type) for item in properties], dtype=np.int64)
+    if all(item.count_type is None for item in properties):
+        row = int(widths.sum())
+        starts[:] = at + row * np.arange(count)[:, None] + np.cumsum(widths) - widths
+        at += row * count
+    else:
+        steps = [
+            None
+            if item.count_type is None
+            else (body.width(item.count_type), body.count_at(item.count_type))
+            for item in properties
+        ]
+        for row in range(count):
+            for k, step in enumerate(steps):
+                if step is not None:
+                    sizes[row, k] = step[1](at)
+                    at += step[0]
+                starts[row, k] = at
+                at += int(sizes[row, k] * widths[k])
+    found: list[tuple[FloatArray, IntArray | None]] = []
+    for k, item in enumerate(properties):
+        run = ranges(np.zeros(count, dtype=np.int64), sizes[:, k])
+        places = np.repeat(starts[:, k], sizes[:, k]) + widths[k] * run
+        found.append(
+            (body.values(places, item.type), None if item.count_type is None else sizes[:, k])
+        )
+    return found, at
+
+
+def _parts(data: bytes) -> tuple[list[tuple[str, int, list[_Property]]], _Body]:
+    """The elements and the body of a PLY file."""
     closing = re.search(rb"[\r\n]end_header[ \t\r]*\n", data)
     if not data.startswith(b"ply") or data[3:4].strip() or closing is None:
         raise InputError("has no PLY header")
@@ -88,6 +180,12 @@ def ply(data: bytes) -> Content:
     encoding, elements = _ply_header(data[3:end].decode("latin-1").splitlines())
     raw = data[body_begin:]
     body = _Body(raw, None if encoding else floats(raw.split(), 1).reshape(-1))
+    return elements, body
+
+
+def ply(data: bytes) -> Content:
+    """PLY, text or binary of either byte order: polygons and triangle strips, vertex normals."""
+    elements, body = _parts(data)
     at = 0
     columns: dict[str, npt.NDArray[Any]] = {}
     sizes = corners = np.zeros(0, dtype=np.int64)

@@ -10,7 +10,7 @@ import shapely
 
 from parapoint.errors import InputError
 from parapoint.files.content import ranges
-from parapoint.surfaces.surface import FloatArray, IntArray
+from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray
 
 THIN = 1e-9
 """Share of a polygon's area below which a triangle of its fan counts as folded or flat."""
@@ -70,6 +70,20 @@ def triangle_rows(vertices: FloatArray, sizes: IntArray, corners: IntArray) -> I
         if (cut := ears(plane)) is not None:
             rows[first_row[polygon] : first_row[polygon] + n - 2] = begin + cut
     return rows
+
+
+def corner_rows(places: IntArray, rows: IntArray) -> tuple[IntArray, BoolArray]:
+    """(C,) the uv row at each corner of polygons, and (F,) the triangles that need others.
+
+    Where the seam runs through a polygon, some corners of its triangles have another row.
+
+    Args:
+        places: (F, 3) for each corner of the triangles, its place among the polygons' corners.
+        rows: (F, 3) its uv row.
+    """
+    row = np.full(int(places.max()) + 1, -1, dtype=np.int64)
+    row[places] = rows
+    return row, (row[places] != rows).any(axis=1)
 
 
 def _plane(ring: FloatArray) -> FloatArray | None:

@@ -14,9 +14,10 @@ import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from parapoint.errors import InputError
 from parapoint.files.content import NO_UV, Content
@@ -99,12 +100,18 @@ class Polygons(NamedTuple):
     Attributes:
         mesh: its triangles.
         places: (F, 3) for each corner of the triangles, its place among the polygons' corners.
+        polygon_of: (F,) the polygon that each triangle is part of.
         extras: what else the file holds, in words: what a writer of the mesh alone leaves out.
+        uv: (F, 3, 2) the UVs of the file at the corners, NaN where it has none; None without any.
+        colours: (V, 3 or 4) of the vertices, as `PointCloud` has them, or None.
     """
 
     mesh: Mesh
     places: IntArray
+    polygon_of: IntArray
     extras: tuple[str, ...]
+    uv: FloatArray | None = None
+    colours: npt.NDArray[Any] | None = None
 
 
 def read_polygons(path: str | Path) -> Polygons | PointCloud:
@@ -125,7 +132,10 @@ def read_polygons(path: str | Path) -> Polygons | PointCloud:
             "polygons" if (content.sizes > 3).any() else "",
             *content.attributes,
         ]
-        return Polygons(mesh, places, tuple(name for name in extras if name))
+        polygon_of = np.searchsorted(np.cumsum(content.sizes), places[:, 0], side="right")
+        named = tuple(name for name in extras if name)
+        colours = content.attributes.get("colours")
+        return Polygons(mesh, places, polygon_of, named, _corner_uv(content, places), colours)
 
 
 def read_parameterized(path: str | Path) -> tuple[Mesh, Parameterization]:
@@ -240,8 +250,12 @@ def _content(path: Path) -> Content:
 
 
 def _check_fits_together(content: Content) -> None:
-    """Check that normals, UVs and UVs of corners are numbers of the shapes that `Content` has."""
+    """Check that what a file holds is numbers of the shapes that `Content` has, a mesh finite."""
     count = len(content.vertices)
+    infinite = ~np.isfinite(content.vertices).all(axis=1)
+    if len(content.sizes) and infinite.any():
+        row = int(infinite.argmax())
+        raise InputError(f"vertices must be finite; row {row} is {content.vertices[row].tolist()}")
     uv_count = 0 if content.uv is None else content.uv.size // 2
     for name, values, shape in (
         ("normals", content.normals, (count, 3)),
@@ -261,7 +275,7 @@ def _mesh(content: Content) -> tuple[Mesh, IntArray]:
     if small.any():
         face = int(np.flatnonzero(small)[0])
         raise InputError(f"face {face} has {int(content.sizes[face])} corners; it needs three")
-    vertices = read_only(content.vertices, np.float64, "vertices", 3)
+    vertices = content.vertices
     outside = (content.corners < 0) | (content.corners >= len(vertices))
     if outside.any():
         corner = int(np.flatnonzero(outside)[0])
@@ -277,6 +291,17 @@ def _mesh(content: Content) -> tuple[Mesh, IntArray]:
         )
     rows = triangle_rows(vertices, content.sizes, content.corners)
     return Mesh(vertices, content.corners[rows]), rows
+
+
+def _corner_uv(content: Content, places: IntArray) -> FloatArray | None:
+    """(F, 3, 2) the UVs at corners, NaN where there is none; None where all lack one."""
+    if content.uv is None or content.uv_corners is None:
+        return None
+    rows = content.uv_corners[places]
+    known = (rows >= 0) & (rows < len(content.uv))
+    uv = np.full((*rows.shape, 2), np.nan)
+    uv[known] = content.uv[rows[known]]
+    return uv if known.any() else None
 
 
 def _shared_corners(mesh: Mesh, uv: FloatArray, corners: IntArray) -> IntArray:

@@ -67,8 +67,8 @@ def grown(
 
     A branch stays where it pays, or where more seam is needed and it brings anything. Branches are
     sought on a free map, where one that fails costs a few steps; a map along them that is one to
-    one is then begun anew, and stays if they pay together. Where they do not, or more seam is
-    needed still, branches of the map that is one to one open one by one, in many more steps.
+    one is then begun anew, and stays if they pay together. Where more seam is needed still,
+    branches of the map that is one to one open one by one, in many more steps.
 
     Args:
         run: the map, settled; it is left as it is.
@@ -79,16 +79,14 @@ def grown(
     need = Need(price, most_starved, most_energy)
     while not run.is_late:
         free = _led_on(run.freed(), need)
-        if free.branches == run.branches and not need.of(run):
-            return run
-        if free.branches == run.branches:
+        longer = free.held(run.deadline) if free.branches > run.branches else None
+        if longer is None:
             break
-        longer = free.held(run.deadline)
         added = (_rim(free.mesh) - _rim(run.mesh)) / 2
-        if longer is None or not run.energy - longer.energy > need.least(run, added):
+        if not run.energy - longer.energy > need.least(run, added):
             break
         run = longer
-    return _led_on(run, need)
+    return _led_on(run, need) if need.of(run) else run
 
 
 def _led_on(run: Run, need: Need) -> Run:

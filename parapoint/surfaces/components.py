@@ -10,7 +10,7 @@ from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
 from parapoint.surfaces.scan_lines import breadth
-from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, PointCloud, Surface
+from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh, PointCloud, Surface
 
 COMPONENTS = ("together", "each", "largest")
 """What the parameter `components` of a fit may say: one map of the whole surface, one of each
@@ -67,6 +67,13 @@ def components(surface: Surface) -> list[Surface]:
         PointCloud(surface.points[label == k], None if normals is None else normals[label == k])
         for k in by_size
     ]
+
+
+def largest_component(mesh: Mesh) -> tuple[Mesh, BoolArray]:
+    """The component of the largest area, and (F,) which faces are its."""
+    label = mesh.face_components
+    chosen = label == np.bincount(label, weights=mesh.face_areas).argmax()
+    return _submesh(mesh, chosen), chosen
 
 
 def cloud_labels(points: FloatArray) -> IntArray:

@@ -138,27 +138,27 @@ def baked(charted: Charted, cloud: PointCloud, kind: str, size: int, margin: int
 
 def _colour(shown: Texels, cloud: PointCloud, margin: int) -> Baked:
     colours = Scattered(cloud.points, unit_colours(cloud.attributes["colours"][:, :3]))
-    flat = _painted(shown, 3, np.uint8, lambda at, _: 255 * colours(at))
-    return Baked(_dilated(flat, shown, margin), {}, _fill(shown))
+    flat = painted(shown, 3, np.uint8, lambda at, _: 255 * colours(at))
+    return Baked(dilated(flat, shown, margin), {}, _fill(shown))
 
 
 def _intensity(shown: Texels, cloud: PointCloud, margin: int) -> Baked:
     values = cloud.attributes["intensity"].reshape(len(cloud.points), -1)[:, :1].astype(np.float64)
     low, span = _range(values)
     known = Scattered(cloud.points, (values - low) / span)
-    flat = _painted(shown, 1, np.uint16, lambda at, _: 65535 * known(at))
+    flat = painted(shown, 1, np.uint16, lambda at, _: 65535 * known(at))
     text = {"intensity of black": repr(low), "intensity of white": repr(low + span)}
-    return Baked(_dilated(flat, shown, margin), text, _fill(shown))
+    return Baked(dilated(flat, shown, margin), text, _fill(shown))
 
 
 def _position(shown: Texels, cloud: PointCloud, margin: int) -> Baked:
     surface = Scattered(cloud.points, cloud.points)
     corner = cloud.points.min(axis=0)
     span = max(float(np.ptp(cloud.points, axis=0).max()), 1e-300)
-    flat = _painted(shown, 3, np.uint16, lambda at, _: 65535 * (surface(at) - corner) / span)
+    flat = painted(shown, 3, np.uint16, lambda at, _: 65535 * (surface(at) - corner) / span)
     alpha = np.zeros(shown.size**2, dtype=np.uint16)
     alpha[shown.places[shown.inside]] = 65535
-    filled = _dilated(flat, shown, margin)
+    filled = dilated(flat, shown, margin)
     pixels = np.concatenate([filled, alpha.reshape(*filled.shape[:2], 1)], axis=2)
     text = {
         "position of black": " ".join(map(repr, corner.tolist())),
@@ -173,10 +173,10 @@ def _normal(shown: Texels, cloud: PointCloud, margin: int) -> Baked:
     known = Scattered(cloud.points, cloud.normals)
     seen_from = in_tangent_space(shown)
 
-    def painted(at: FloatArray, rows: slice) -> FloatArray:
+    def values(at: FloatArray, rows: slice) -> FloatArray:
         return np.asarray(127.5 * (seen_from(known(at), rows) + 1))
 
-    return Baked(_dilated(_painted(shown, 3, np.uint8, painted), shown, margin), {}, _fill(shown))
+    return Baked(dilated(painted(shown, 3, np.uint8, values), shown, margin), {}, _fill(shown))
 
 
 def _range(values: FloatArray) -> tuple[float, float]:
@@ -189,7 +189,7 @@ def _fill(shown: Texels) -> float:
     return float(shown.inside.sum() / shown.size**2)
 
 
-def _painted(
+def painted(
     shown: Texels,
     channels: int,
     kind: type[np.uint8 | np.uint16],
@@ -215,7 +215,7 @@ def _batches(count: int) -> Iterator[slice]:
     return (slice(k, k + BATCH) for k in range(0, count, BATCH))
 
 
-def _dilated(flat: Pixels, shown: Texels, margin: int) -> Pixels:
+def dilated(flat: Pixels, shown: Texels, margin: int) -> Pixels:
     """(N, N, c) the image: texels of the surface, their edge repeated, and their mean elsewhere."""
     size = shown.size
     image: npt.NDArray[Any] = np.empty((size * size, flat.shape[1]), dtype=flat.dtype)

@@ -11,13 +11,16 @@ from typing import ClassVar
 import numpy as np
 
 from parapoint.computed.computed_map import ComputedMap
+from parapoint.computed.parts import DISTORTIONS, towards_conformal
 from parapoint.computed.reconstruction import ReconstructionError
+from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
-from parapoint.parameters import check_number
+from parapoint.parameters import check_choice, check_number
 from parapoint.planar.descent import LEAST_ENERGY, Run, sound
 from parapoint.planar.domains import FlatteningError
 from parapoint.planar.embedding import embeddable
 from parapoint.planar.growth import PRICE, grown
+from parapoint.planar.scaffold import of_area_one
 from parapoint.surfaces.across_seams import learned_seam
 from parapoint.surfaces.areas import MOST_STARVED, starved_share
 from parapoint.surfaces.cutting import cut_along, disk_cut, edge_lengths
@@ -27,10 +30,19 @@ from parapoint.surfaces.sampling import FEWEST_VERTICES
 from parapoint.surfaces.surface import BoolArray, Mesh, Surface
 
 POINTS_OF_A_FACE = 100
-"""Points that are sampled on each face of a mesh with few faces. Along the seams of a fish of 220
-faces the energy is 4.65 to 5.02 (three seeds) with 20,000 points, 5.45 to 6.07 with 2,000."""
+"""Of a mesh with few faces so many points are sampled on each."""
+ENOUGH_POINTS = 6_000
+"""So many points show where any mesh should open. camelhead (22,704 faces) comes to an energy of
+4.30 with them in 20 s of processor time, to 4.39 with 20,000 in 45 s; a fish of 220 faces to 5.38
+in 7 s, to 5.63 in 27 s."""
+STEPPING = 0.9
+"""Share of a time budget after which no step begins: the last one takes time, too."""
+SHARE_UNCUT = 0.2
+"""Share of a time budget in which a map without a cut is sought."""
+LEAST_TIME = 0.01
+"""Seconds that a part has at least, however little time is left."""
 SHARE_OF_SEAM = 0.5
-"""Share of a time budget in which the computed map, which tells the seam, is to be ready."""
+"""Share of the time left then in which the computed map, which tells the seam, is to be ready."""
 
 
 @dataclass(frozen=True)
@@ -50,19 +62,23 @@ class Unwrap:
     good that none could, no map is computed. Components are mapped one after another.
 
     Attributes:
-        points: of the computed map; None for its own number, or fewer for a mesh of few faces.
+        points: of the computed map; None for as many as show where the mesh should open.
         time_budget: seconds for each component, or None for no bound. No step begins after that;
             the map is then as good as it has become.
         price: what the symmetric Dirichlet energy (4 at least) must fall by for each sqrt(area) of
             seam; None for the learned seam, no shorter and no longer.
         max_distortion: symmetric Dirichlet energy, above 4, down to which the seam grows at
             whatever price; None for no such bound. The report has the energy that was reached.
+        distortion: "isometric" weighs angles and areas alike, as the energy does; "balanced" goes
+            on from there to keep angles as far as every part keeps its area; "conformal" keeps
+            angles along the first seam, whatever becomes of an ear or a finger.
     """
 
     points: int | None = None
     time_budget: float | None = None
     price: float | None = PRICE
     max_distortion: float | None = None
+    distortion: str = "isometric"
 
     requires: ClassVar[frozenset[str]] = frozenset({"faces", "manifold", "oriented", "connected"})
     packages: ClassVar[tuple[str, ...]] = ("libigl", "shapely")
@@ -74,6 +90,12 @@ class Unwrap:
             check_number("time_budget", self.time_budget, above=True)
         if self.max_distortion is not None:
             check_number("max_distortion", self.max_distortion, LEAST_ENERGY, above=True)
+        check_choice("distortion", self.distortion, DISTORTIONS)
+        if self.max_distortion is not None and self.distortion != "isometric":
+            raise InputError(
+                f"max_distortion bounds an energy that distortion {self.distortion} gives up for "
+                f"angles: leave one of them out"
+            )
 
     @property
     def deterministic(self) -> bool:
@@ -100,7 +122,7 @@ class Unwrap:
             method = self
             if self.time_budget is not None:
                 share = max(end - time.monotonic(), 0.0) * len(part.faces) / left
-                method = dataclasses.replace(self, time_budget=max(share, 0.01))
+                method = dataclasses.replace(self, time_budget=max(share, LEAST_TIME))
             maps.append(method.parameterize(part, seed=seed))
             left -= len(part.faces)
         joined = preparation.joined(maps)
@@ -120,13 +142,16 @@ class Unwrap:
             raise UnsupportedError("needs faces; the surface is a point cloud")
         mesh = sound(surface)
         seconds = self.time_budget
-        deadline = math.inf if seconds is None else time.monotonic() + seconds
-        whole = self._uncut(mesh, deadline)
+        begun = time.monotonic()
+        deadline = math.inf if seconds is None else begun + STEPPING * seconds
+        whole = self._uncut(mesh, math.inf if seconds is None else begun + SHARE_UNCUT * seconds)
         if whole is not None and self._needs_no_cut(whole, mesh):
+            self._keep_angles(whole)
             report = {**whole.report(), "learned_seam_edges": 0, "computed": "no cut could pay"}
             return Parameterization(whole.uv, whole.mesh.faces, report=report)
-        points = self.points or _enough_points(mesh, ComputedMap().points)
-        budget = None if seconds is None else SHARE_OF_SEAM * seconds
+        points = self.points or _enough_points(mesh)
+        left = max(deadline - time.monotonic(), LEAST_TIME)
+        budget = None if seconds is None else SHARE_OF_SEAM * left
         computed: dict[str, object]
         try:
             learned = ComputedMap(points, distortion="conformal", time_budget=budget).parameterize(
@@ -145,11 +170,13 @@ class Unwrap:
         run = Run(embeddable(disk), deadline)
         run.begin()
         run.improve()
-        if self.price is not None:
+        if self.price is not None and self.distortion != "conformal":
             if whole is not None and whole.energy <= run.energy + self.price * _length(mesh, seam):
                 run, seam = whole, np.zeros_like(seam)
+                run.deadline = deadline
             run = grown(run, self.price, most_energy=self.max_distortion or np.inf)
             run.improve()
+        self._keep_angles(run)
         report = {
             **run.report(),
             "learned_seam_edges": int(seam.sum()),
@@ -169,6 +196,15 @@ class Unwrap:
         run.improve()
         return run
 
+    def _keep_angles(self, run: Run) -> None:
+        """Move the map down the conformal energy as far as `distortion` says."""
+        if self.distortion == "isometric":
+            return
+        most_starved = 1.0 if self.distortion == "conformal" else MOST_STARVED
+        unit = of_area_one(run.mesh.vertices, run.mesh.faces)
+        uv = towards_conformal(unit, run.uv / run.unit, run.deadline, most_starved)
+        run.take(run.unit * uv, run.start)
+
     def _needs_no_cut(self, whole: Run, mesh: Mesh) -> bool:
         """Whether not even the shortest cut there is, one edge, could pay, nor a bound asks it."""
         assert self.price is not None
@@ -183,6 +219,6 @@ def _length(mesh: Mesh, seam: BoolArray) -> float:
     return float(edge_lengths(mesh)[seam].sum() / np.sqrt(mesh.face_areas.sum()))
 
 
-def _enough_points(mesh: Mesh, most: int) -> int:
-    """Points that show where a mesh should open, at its edges: all vertices, or some a face."""
-    return min(most, max(FEWEST_VERTICES, POINTS_OF_A_FACE * len(mesh.faces)))
+def _enough_points(mesh: Mesh) -> int:
+    """Points that show where a mesh should open: some on each face, or some of its vertices."""
+    return min(ENOUGH_POINTS, max(FEWEST_VERTICES, POINTS_OF_A_FACE * len(mesh.faces)))

@@ -8,7 +8,7 @@ from pathlib import Path
 from parapoint.errors import InputError
 from parapoint.files.targets import write_text
 from reports.history.comparison import Comparison
-from reports.history.tables import alone, ended, moved, summary
+from reports.history.tables import alone, by_metric, ended, moved, summary
 from reports.pictures.names import slug
 from reports.tables import formats
 
@@ -26,7 +26,7 @@ def write(folder: Path, others: Sequence[Path]) -> list[tuple[Path, str]]:
         if other.resolve() == folder.resolve():
             raise InputError(f"{other}: a folder is not compared with itself; name another")
         found = Comparison(other, folder)
-        tables = [summary(found), moved(found), ended(found), alone(found)]
+        tables = [by_metric(found), summary(found), moved(found), ended(found), alone(found)]
         made = [table for table in tables if table is not None]
         into = folder / "report" / "history" / slug(other.resolve().name)
         formats.write(made, into)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
@@ -76,7 +77,8 @@ def summary(found: Comparison) -> Table:
 
 def _notes(found: Comparison) -> Iterator[str]:
     """What the two folders are, and what holds for all tables."""
-    yield f"Before: {found.before}. After: {found.after}."
+    before, after = found.names if all(found.names) else (found.before, found.after)
+    yield f"Before: {before}. After: {after}."
     for name, (old, new) in found.machines.items():
         yield f"{name}: {old or 'none'} before, {new or 'none'} after."
     if not found.same_hardware:
@@ -157,6 +159,45 @@ def _changed(old: Group, new: Group) -> str:
     others = [[getattr(row, name) for row in new.rows.values()] for name in known.values()]
     pairs = zip(known, sides, others, strict=True)
     return ", ".join(name for name, one, two in pairs if set(one) != set(two)) or "nothing"
+
+
+def by_metric(found: Comparison) -> Table | None:
+    """For each metric that moved beyond noise, in how many cells and where most; None for none."""
+    rows: list[Mapping[str, Value]] = []
+    for name in dict.fromkeys(move.name for move in found.moves):
+        own = [move for move in found.moves if move.name == name]
+        finite = [move for move in own if math.isfinite(move.after - move.before)]
+        most = max(finite, key=lambda move: abs(move.after - move.before), default=own[0])
+        verdicts = [move.verdict for move in own]
+        rows.append(
+            {
+                "metric": metric_column(name).title,
+                "better": float(verdicts.count("better")),
+                "worse": float(verdicts.count("worse")),
+                "most": f"{found.group(most.key)[1].short} on {most.key[1]}",
+                "before": most.before,
+                "after": most.after,
+            }
+        )
+    if not rows:
+        return None
+    return Table(
+        name="metrics",
+        title="What moved, metric by metric",
+        caption=(
+            f"Of {len(found.shared)} cells in both, those in which the metric moved by more than "
+            "its noise, and the largest of these moves."
+        ),
+        columns=(
+            Column("metric", "Metric", text=True),
+            Column("better", "better", digits=0),
+            Column("worse", "worse", digits=0),
+            Column("most", "moved most", text=True),
+            Column("before", "before", digits=4),
+            Column("after", "after", digits=4),
+        ),
+        blocks=(tuple(rows),),
+    )
 
 
 def ended(found: Comparison) -> Table | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from markupsafe import Markup
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
 
+from benchmarks.commands.listing import credit
 from benchmarks.metrics.grades import BOUNDS
 from benchmarks.rendering.maps import ANGLE_SCALE, AREA_SCALE
 from parapoint.files.targets import write_text
@@ -62,15 +62,21 @@ def _templates() -> Environment:
     )
 
 
-def index(folder: Path, sections: Sequence[Section]) -> str:
-    """The HTML of the index of the report on the results in `folder`."""
+Links = Sequence[tuple[str, str]]
+"""Title and address of pages beside the index: of a site, those of its methods and of its history.
+"""
+
+
+def index(folder: str, sections: Sequence[Section], links: Links = ()) -> str:
+    """The HTML of the index of a report on the results in `folder`, or of a site, with `links`."""
     return (
         _templates()
         .get_template("index.html")
         .render(
             sections=sections,
-            folder=str(folder),
-            report_command=shlex.join(["python", "-m", "reports", str(folder)]),
+            folder=folder,
+            links=links,
+            licence=lambda label: credit(label.method)[0],
             cells=_inline(board.data([section.contents for section in sections])),
             grouped=grouped,
             definition=definition,
@@ -130,23 +136,39 @@ def model_page(section: Section, case: str) -> str:
     )
 
 
+def method_page(
+    label: Label, about: Sequence[str], heads: Sequence[str], lines: Sequence[object]
+) -> str:
+    """The HTML of a method's page: what it is, and a line for each model.
+
+    Args:
+        label: the method.
+        about: what there is to say of it, line by line.
+        heads: of the metrics.
+        lines: as `reports.site.methods.Line`.
+    """
+    template = _templates().get_template("method.html")
+    return template.render(label=label, about=about, heads=heads, lines=lines, params=_params)
+
+
 def _colours(name: str) -> list[str]:
     """33 colours of a colour map, which a browser joins linearly."""
     return [to_hex(colormaps[name](place / 32)) for place in range(33)]
 
 
-def write(report: Path, folder: Path, sections: Sequence[Section]) -> Path:
+def write(report: Path, folder: str, sections: Sequence[Section], links: Links = ()) -> Path:
     """Write the pages of a report, and what they share; the path of the index."""
     loader = Path(__file__).parent / "templates"
     for name in ASSETS:
-        _put(report / "assets" / name, (loader / name).read_text(encoding="utf-8"))
+        put(report / "assets" / name, (loader / name).read_text(encoding="utf-8"))
     for section in sections:
         for case in section.contents.cases:
-            _put(report / page_of(section.contents, case), model_page(section, case))
-    return _put(report / "index.html", index(folder, sections))
+            put(report / page_of(section.contents, case), model_page(section, case))
+    return put(report / "index.html", index(folder, sections, links))
 
 
-def _put(path: Path, text: str) -> Path:
+def put(path: Path, text: str) -> Path:
+    """Write a page, and the folders above it; its path."""
     path.parent.mkdir(parents=True, exist_ok=True)
     write_text(path, text)
     return path

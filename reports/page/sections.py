@@ -113,6 +113,7 @@ class Section:
         tables: in the order in which to read them.
         figures: those that were drawn.
         faults: what could not be drawn, and why.
+        results: the folder that its commands name: the one that it was made from.
     """
 
     report: Path
@@ -120,6 +121,7 @@ class Section:
     tables: Sequence[Table]
     figures: Sequence[Drawn]
     faults: Sequence[str]
+    results: Path
 
     @property
     def name(self) -> str:
@@ -330,9 +332,9 @@ class Section:
         return shlex.join(["nox", "-s", "bench", "--", self.name, "--out", str(self.results)])
 
     @property
-    def results(self) -> Path:
-        """The folder that the report was made from."""
-        return self.report.parent
+    def report_command(self) -> str:
+        """The command that writes the report."""
+        return shlex.join(["python", "-m", "reports", str(self.results)])
 
     @property
     def command(self) -> str:

@@ -10,6 +10,7 @@ from multiprocessing import get_context
 from typing import TypeVar
 
 from benchmarks.running.limits import end_with
+from parapoint.files.decoding import allow, allowed
 
 Result = TypeVar("Result")
 _log = logging.getLogger("parapoint")
@@ -36,13 +37,22 @@ def done_by_several(
             yield pending.result()
 
 
+def _begin(parent: int, decoded: float) -> None:
+    """Let this process end with its parent, and files decode to as much as they may there."""
+    end_with(parent)
+    allow(decoded)
+
+
 def _pool(jobs: int) -> ProcessPoolExecutor | None:
     """Processes for `jobs` jobs; None for one job, or where there can be no others."""
     if jobs <= 1:
         return None
     try:
         return ProcessPoolExecutor(
-            jobs, mp_context=get_context("spawn"), initializer=end_with, initargs=(os.getpid(),)
+            jobs,
+            mp_context=get_context("spawn"),
+            initializer=_begin,
+            initargs=(os.getpid(), allowed()),
         )
     except OSError as error:
         _log.warning("one process draws alone: %s", error.strerror)

@@ -111,7 +111,7 @@ def shares(contents: Contents) -> list[Share]:
     won = np.mean([halves(contents, name) for name in COUNTED], axis=0)[:, own][:, :, own] / WON
     every = (won.sum(axis=2) - 0.5) / (len(own) - 1)  # nobody meets itself: that half is no pair
     found = [
-        (contents.methods[n].short, float(column.mean()), half_width(column))
+        (contents.methods[n].short, float(column.mean()), min(half_width(column), 1.0))
         for n, column in zip(own, every.T, strict=True)
     ]
     found.sort(key=lambda one: -one[1])

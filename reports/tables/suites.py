@@ -21,6 +21,7 @@ from reports.contents import (
 )
 from reports.means import STATISTICS, common_cases, common_values, own_values, statistic
 from reports.ranking import MOST_LEFT_OUT, TIMES, may_rank, means_may_rank
+from reports.tables.bakes import bakes
 from reports.tables.kinds import means_by_kind, success
 from reports.tables.notes import (
     environment_note,
@@ -425,6 +426,7 @@ def tables(contents: Contents) -> list[Table]:
         conformality(contents),
         against_published(contents),
         supplement(contents),
+        bakes(contents),
         comparison(contents),
         cuts(contents),
         paired_tests(contents),

@@ -150,7 +150,7 @@ def test_the_command_of_a_suite_of_the_user_s_own_runs_its_cells(tmp_path: Path)
             row = writer.cell("a file.off", sheet(), method, given, status="failed", reason="no")
             writer.store.append(dataclasses.replace(row, id=row.id[::-1], suite="custom"))
     report = tmp_path / "report"
-    named, custom = (Section(report, one, (), (), ()) for one in contents(tmp_path))
+    named, custom = (Section(report, one, (), (), (), tmp_path) for one in contents(tmp_path))
     assert named.suite_command == f"nox -s bench -- paper --out {tmp_path}"
     assert custom.suite_command == ""
     assert shlex.split(named.command)[:6] == [

@@ -91,7 +91,7 @@
       }, 0) / rivals.length);
       const mean = means.reduce((sum, value) => sum + value, 0) / means.length;
       const spread = Math.sqrt(means.reduce((sum, value) => sum + (value - mean) ** 2, 0) / (means.length - 1) / means.length);
-      return [one.at, { mean, half: means.length > 1 ? spread * facts.quantiles[means.length] : null }];
+      return [one.at, { mean, half: means.length > 1 ? Math.min(spread * facts.quantiles[means.length], 1) : null }];
     }));
   }
 

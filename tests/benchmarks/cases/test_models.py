@@ -323,7 +323,7 @@ def test_a_sampled_cloud_of_a_model_that_is_not_at_hand_is_missing():
     [
         ("swiss_roll@noise=x", "not by @noise=x"),
         ("swiss_roll@noise=0.2", "0.1 at most"),
-        ("swiss_roll@dense", "MODEL@uneven, not by @dense"),
+        ("swiss_roll@dense", "MODEL@smooth or @fine, not by @dense"),
         ("nothing_of_it@uneven", "there is no model 'nothing_of_it'"),
     ],
 )

@@ -80,9 +80,7 @@ def test_a_file_that_changes_is_found(tmp_path, monkeypatch):
             return subprocess.call([sys.executable, "-c", wrong, str(folder)])
         return 0
 
-    monkeypatch.setattr(
-        bystanders, "_inputs", lambda at: (at / "results").mkdir(parents=True) or {}
-    )
+    monkeypatch.setattr(bystanders, "inputs", lambda at: (at / "results").mkdir(parents=True) or {})
     monkeypatch.setattr(bystanders, "_status", status)
     found = bystanders.undisturbed(tmp_path / "folder", count=6, seed=0)
     assert found.faults

@@ -82,6 +82,19 @@ def test_edges_cover_the_width_asked_for():
     assert cover == pytest.approx(200 * (4 + 2 * np.sqrt(2)), rel=0.02)
 
 
+def test_edges_never_fill_faces_that_are_small_on_the_screen():
+    vertices, faces = igl.triangulated_grid(60, 60)
+    fine = Mesh(np.column_stack([vertices, np.zeros(len(vertices))]), faces)
+    cover = Scene(fine, shadows=False).view(camera(fine, Z, Y), 64).edge_cover(1.1)
+    assert 0.1 < cover.mean() < 0.5
+
+
+def test_the_picture_of_a_strip_is_no_thinner_than_a_quarter_of_its_length():
+    strip = Mesh(square().vertices * [16, 1, 1], square().faces)
+    np.testing.assert_allclose(camera(strip, Z, Y, margin=1.0).half, [8, 2])
+    np.testing.assert_allclose(camera(square(), Z, Y, margin=1.5).half, [0.75, 0.75])
+
+
 def test_both_ray_casters_see_the_same():
     pytest.importorskip("embreex")
     mesh = icosphere()
@@ -133,6 +146,12 @@ def test_a_mirrored_triangle_is_lit_from_its_own_side():
     turned = Mesh(mesh.vertices, mesh.faces[:, ::-1])
     light = [Scene(m).view(camera(m, Z, Y), 16).light[0].mean() for m in (mesh, turned)]
     assert light[1] == pytest.approx(0.72 * light[0], rel=1e-3)
+
+
+def test_a_square_that_faces_the_camera_is_lit_by_sky_key_and_fill():
+    """Its normal is (0, 0, 1): three quarters of the sky, and the lights by their third part."""
+    light = Scene(square(), shadows=False).view(camera(square(), Z, Y), 16).light[0]
+    np.testing.assert_allclose(light, 0.50 * 0.75 + 0.62 * 0.71 + 0.12 * 0.59, rtol=1e-5)
 
 
 def test_upright_stands_on_the_opening_or_on_a_flat_base():

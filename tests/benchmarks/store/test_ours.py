@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.store.results import NAMES, Store
 from parapoint.errors import InputError
-from reports.report import MARK, _claim
+from reports.report import MARK, claim
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -34,10 +34,10 @@ def test_our_own_folder_is_known_from_its_first_moment(tmp_path: Path) -> None:
 
 
 def test_a_report_is_written_into_a_folder_of_ours_alone(tmp_path: Path) -> None:
-    _claim(tmp_path / "report")
-    _claim(tmp_path / "report")
+    claim(tmp_path / "report")
+    claim(tmp_path / "report")
     assert (tmp_path / "report" / MARK).exists()
     (tmp_path / "report" / MARK).unlink()
     (tmp_path / "report" / "index.html").write_text("mine")
     with pytest.raises(InputError, match="not known to be ours"):
-        _claim(tmp_path / "report")
+        claim(tmp_path / "report")

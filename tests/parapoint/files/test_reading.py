@@ -1,6 +1,7 @@
 """Reading and writing: what is in a file, in its order; one line for whatever is wrong with it."""
 
 import base64
+import errno
 import json
 import logging
 import struct
@@ -681,8 +682,12 @@ def test_writing_leaves_the_old_file_or_the_new_one(tmp_path, monkeypatch):
     mesh, parameterization = bent()
     with pytest.raises(InputError, match="cannot be written"):
         write_obj(path, Mesh(mesh.vertices, mesh.faces[:1]), parameterization)
-    monkeypatch.setattr(Path, "replace", lambda *_: (_ for _ in ()).throw(OSError("disk full")))
-    with pytest.raises(OSError, match="disk full"):
+
+    def replace(*_):
+        raise OSError(errno.ENOSPC, "disk full")
+
+    monkeypatch.setattr(Path, "replace", replace)
+    with pytest.raises(OSError, match=r"disk full: .*a\.obj"):
         write_obj(path, mesh, parameterization)
     assert [file.name for file in tmp_path.iterdir()] == ["a.obj"]
     assert path.read_text() == "precious"

@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
 
 from parapoint.surfaces.gridding import CELLS, gridded
@@ -27,7 +28,8 @@ def test_what_no_image_is_near_is_left_out() -> None:
     assert (np.linalg.norm(own.uv - [1.5, 1], axis=1) > 0.25).all()
 
 
-def test_faces_over_a_tear_are_left_out() -> None:
+@pytest.mark.parametrize("height", [0.1, 5.0])  # 25 cells, and 1,280
+def test_faces_over_a_tear_are_left_out(height: float) -> None:
     known = RNG.random((3000, 2))
-    torn = gridded(known, lambda uv: np.column_stack([uv, 5.0 * (uv[:, 0] > 0.5)])).mesh
+    torn = gridded(known, lambda uv: np.column_stack([uv, height * (uv[:, 0] > 0.5)])).mesh
     assert torn.component_count == 2

@@ -8,10 +8,8 @@ import pytest
 
 from parapoint import cli
 from parapoint.files.reading import read_parameterized, read_surface
-from parapoint.surfaces.parameterization import Charted, Parameterization
-from parapoint.surfaces.surface import Mesh
+from parapoint.surfaces.areas import MOST_STARVED
 from parapoint.testing import irregular_disk
-from parapoint.unwrapping.quality import quality
 from parapoint.unwrapping.unwrap import Unwrap
 
 BOX = """# a box of quads
@@ -107,18 +105,9 @@ def test_a_seam_through_a_polygon_makes_it_triangles_and_says_so(
     assert (tmp_path / "out.obj").read_text().count("\nf ") == 7
 
 
-def test_a_texture_of_the_old_uvs_is_not_shown_with_the_new(box, tmp_path, capsys, caplog) -> None:
-    (tmp_path / "colours.mtl").write_text("newmtl red\nmap_Kd wood.png\n")
-    unfold(box, tmp_path / "out.obj", capsys)
-    assert "were drawn for other UVs" in caplog.text
-    written = (tmp_path / "out.obj").read_text()
-    assert "mtllib" not in written
-    assert "usemtl red" in written
-
-
 def test_other_formats_and_one_uv_a_vertex(box, tmp_path, capsys, caplog) -> None:
     unfold(box, tmp_path / "out.npz", capsys)
-    assert "left out: old UVs, polygons" in caplog.text
+    assert "left out: old UVs, polygons. A .obj file would keep them" in caplog.text
     with np.load(tmp_path / "out.npz") as held:
         assert held["vertices"].shape == (8, 3)
         assert held["uv"].shape == (14, 2)
@@ -187,26 +176,48 @@ def test_a_lower_bound_makes_a_longer_seam() -> None:
     assert seam[1] > seam[0]
 
 
-def test_quality_by_hand() -> None:
-    # Two right triangles of a unit square; the second is shrunk to a tenth.
-    vertices = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
-    mesh = Mesh(vertices, [[0, 1, 2], [0, 2, 3]])
-    uv = np.array([[0, 0], [0.5, 0], [0.5, 0.5], [0.6, 0.6], [0.65, 0.65], [0.6, 0.65]])
-    found = quality(Charted(mesh, Parameterization(uv, [[0, 1, 2], [3, 4, 5]])), 1000)
-    assert found.starved == pytest.approx(0.5)
-    assert found.smallest_part == pytest.approx(2 / 101)
-    assert found.flipped == 0
-    assert found.charts == 2
-    assert found.seam == pytest.approx(2**0.5)
-    assert found.filled == pytest.approx(0.12625)
-    assert found.angle_worst == pytest.approx(0, abs=1e-9)
-    assert found.texels_per_unit == pytest.approx(1000 * 0.12625**0.5)
-    scale = (1 / 0.12625) ** 0.5
-    assert found.stretch_worst == pytest.approx(1 / (0.05 * scale))
-    assert found.stretch_mean == pytest.approx((0.5 * scale + 1 / (0.05 * scale)) / 2)
-    # Sheared by one: the right angle becomes one of 45 degrees.
-    sheared = Parameterization([[0, 0], [1, 0], [2, 1], [1, 1]], mesh.faces)
-    assert quality(Charted(mesh, sheared), 1).angle_worst == pytest.approx(45)
-    assert quality(Charted(mesh, sheared), 1).charts == 1
-    mirrored = Parameterization([[0, 0], [-1, 0], [-1, 1], [0, 1]], mesh.faces)
-    assert quality(Charted(mesh, mirrored), 1).flipped == 2
+@pytest.fixture(scope="module")
+def bump():
+    """A sphere but for a cap: along no cut, angles and areas are not to be had together."""
+    from benchmarks.cases import builtin
+
+    return builtin.sphere_cap(150, rings=8)
+
+
+@pytest.mark.parametrize("distortion", ["conformal", "balanced"])
+def test_a_map_that_is_to_keep_angles_keeps_them_better(bump, distortion) -> None:
+    from benchmarks.metrics.evaluation import evaluate
+
+    made = {
+        name: evaluate(bump, Unwrap(points=150, price=1e9, distortion=name).unwrapped(bump))
+        for name in ("isometric", distortion)
+    }
+    off = {name: found["angle_difference_mean"] for name, found in made.items()}
+    assert off[distortion] < 0.8 * off["isometric"]
+    assert made["isometric"]["symmetric_dirichlet"] < made[distortion]["symmetric_dirichlet"]
+    for found in made.values():
+        assert found["flipped_fraction"] == found["overlap_area"] == 0
+    if distortion == "balanced":
+        assert made["balanced"]["starved_area_fraction"] <= MOST_STARVED
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--distortion", "conformal", "--max-distortion", 4.5], "max_distortion bounds an energy"),
+        (["--distortion", "conformal", "--seam-price", 1], "--seam-price does not go"),
+        (["--distortion", "wavy"], "isometric"),
+    ],
+)
+def test_options_that_do_not_go_together_are_refused(box, tmp_path, capsys, options, words) -> None:
+    status, _, said = run(["unwrap", box, "--out", tmp_path / "new.glb", *options], capsys)
+    assert status == 2
+    assert words in said
+    assert len(said.strip().splitlines()) == 1
+    assert not (tmp_path / "new.glb").exists()
+
+
+def test_a_distortion_does_not_go_with_seams_that_are_given(box, tmp_path, capsys) -> None:
+    status, _, said = unfold(box, tmp_path / "new.glb", capsys, "--distortion", "balanced")
+    assert status == 2
+    assert "--distortion does not go with --seams" in said

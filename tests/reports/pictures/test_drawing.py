@@ -2,18 +2,13 @@ import json
 import shutil
 
 import numpy as np
-import pytest
 from PIL import Image as Images
 
-from benchmarks.rendering.colours import linear
-from benchmarks.rendering.maps import ANGLE_SCALE, Map, heat
-from parapoint.surfaces.parameterization import Parameterization
-from parapoint.surfaces.surface import Mesh
 from reports.contents import contents
 from reports.pictures.drawing import draw, known_keys
 from reports.pictures.names import ARTIST_PICTURES, map_file, model_file, slug
 
-from ..conftest import HAND, HOSTILE, NEFERTITI, Writer, ball, flat, lonlat, sheet
+from ..conftest import HAND, HOSTILE, NEFERTITI, Writer, flat, sheet
 
 
 def test_slugs_are_safe_and_distinct():
@@ -21,46 +16,6 @@ def test_slugs_are_safe_and_distinct():
     assert slug("a/b") != slug("a_b")
     assert set(slug(HOSTILE)) <= set("abcdefghijklmnopqrstuvwxyz0123456789.-")
     assert not slug("../x").startswith(".")
-
-
-def test_uv_is_scaled_to_the_area_upright_and_unmirrored():
-    mesh = sheet()
-    uv = flat(mesh).uv * [-8, 2]
-    found = Map(mesh, Parameterization(uv, mesh.faces)).uv
-    a, b = found[:, 1] - found[:, 0], found[:, 2] - found[:, 0]
-    areas = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
-    assert areas.min() > 0
-    assert areas.sum() == pytest.approx(mesh.face_areas.sum())
-    width, height = np.ptp(found, axis=(0, 1))
-    assert height > 3 * width
-
-
-def test_spanning_faces_neither_scale_nor_colour_the_map():
-    mesh = ball()
-    found = Map(mesh, lonlat(mesh))
-    assert 0 < found.spanning.mean() < 0.3
-    assert not (found.flipped & found.spanning).any()
-    np.testing.assert_array_equal(np.isnan(found.angle), found.spanning)
-    np.testing.assert_array_equal(np.isnan(found.area), found.spanning)
-
-
-def test_heat_of_a_stretch_known_by_hand():
-    mesh = Mesh(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), [[0, 1, 2]])
-    found = Map(mesh, Parameterization([[0.0, 0], [4, 0], [0, 1]], mesh.faces))
-    np.testing.assert_allclose(found.angle, [2.0])
-    np.testing.assert_allclose(found.area, [0.0], atol=1e-12)
-
-
-def test_a_face_without_uv_area_has_the_worst_colour():
-    mesh = sheet()
-    uv = flat(mesh).uv.copy()
-    uv[mesh.faces[0]] = uv[mesh.faces[0, 0]]
-    found = Map(mesh, Parameterization(uv, mesh.faces))
-    assert found.angle[0] == np.inf
-    assert found.area[0] == -np.inf
-    colours = heat(np.array([0.0, np.inf, 2.0, np.nan]), ANGLE_SCALE)
-    np.testing.assert_array_equal(colours[1], colours[2])
-    np.testing.assert_allclose(colours[3], linear([0.8] * 3))
 
 
 def test_pictures_are_drawn_once_and_again_when_something_changed(results, tmp_path):

@@ -2,9 +2,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from benchmarks.commands import bake
-from benchmarks.commands.bake import looked_up, nearest_baked, wave_colours
-from parapoint import InputError, Mesh, Parameterization, PointCloud
+from baselines.textured import Textured, looked_up, nearest_baked
+from benchmarks.cases.coloured import coloured, wave_colours
+from parapoint import Mesh, Parameterization, PointCloud
+from parapoint.method import UnsupportedError
 from parapoint.surfaces.parameterization import Charted
 
 FACES = np.array([[0, 1, 2], [0, 2, 3]])
@@ -38,23 +39,23 @@ def test_waves_are_no_finer_than_said() -> None:
     assert 5 < steps < 2 * np.pi * 5 * 12 / 8 * 3
 
 
-def test_a_failure_is_a_row_and_ours_beats_todays_on_a_small_model(monkeypatch) -> None:
-    monkeypatch.setattr(bake, "load", lambda _: PLATE.mesh)
-    monkeypatch.setattr(bake, "TEXELS", 128)
-    monkeypatch.setattr(bake, "OURS", "computed(points=300)")
-    monkeypatch.setattr(bake, "TODAY", ("failing",))
-    ours = bake.method("computed(points=300)")
+def test_ours_reads_back_better_than_the_nearest_colour() -> None:
+    cloud = coloured(PLATE.mesh, 5.0, 3000)
+    made = Textured(texels=128).parameterize(cloud, seed=0)
+    assert len(made.uv) == 3000
+    assert made.report["held_out"] == pytest.approx(600, abs=60)
+    seen = cloud.points[np.random.default_rng(0).random(3000) > 0.2]
+    assert made.report["bake_psnr"] > 30
+    rows = np.flatnonzero(~np.isin(cloud.points[:, 0], seen[:, 0]))
+    nearest = nearest_baked(PLATE, PointCloud(seen, attributes={"colours": colours_at(seen)}), 128)
+    wrong = looked_up(PLATE, nearest, cloud.points[rows]) - wave_colours(cloud.points[rows], 5.0)
+    assert made.report["bake_psnr"] > -10 * np.log10((wrong**2).mean()) > 15
 
-    class Failing:
-        def charted(self, _, *, seed):
-            assert seed == 0
-            raise RuntimeError("no surface")
 
-    monkeypatch.setattr(bake, "method", lambda s: ours if s.startswith("c") else (s, Failing()))
-    rows = list(bake.bakings(("plate",), 3000))
-    assert [row.reason for row in rows] == ["", "", "no surface", "no surface"]
-    assert rows[0].psnr > rows[1].psnr > 15
-    assert rows[0].psnr > 30
-    monkeypatch.setattr(bake, "load", lambda _: PointCloud(PLATE.mesh.vertices))
-    with pytest.raises(InputError, match="is a cloud"):
-        list(bake.bakings(("scan",), 3000))
+def colours_at(points) -> np.ndarray:
+    return np.rint(255 * wave_colours(points, 5.0)).astype(np.uint8)
+
+
+def test_a_cloud_without_colours_is_skipped() -> None:
+    with pytest.raises(UnsupportedError, match="with colours"):
+        Textured().parameterize(PointCloud(PLATE.mesh.vertices), seed=0)

@@ -1,0 +1,227 @@
+"""What `unwrap` writes of a mesh: its file with new UVs, and what it showed, in a new texture."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from parapoint.commands.output import SIDES, TEXTURE
+from parapoint.files.gltf_rewriting import check_rewritable, rewrite_gltf
+from parapoint.files.mesh_writers import (
+    write_material,
+    write_npz,
+    write_picture,
+    write_ply,
+    write_textured,
+)
+from parapoint.files.obj_rewriting import libraries, rewrite_obj, write_library
+from parapoint.files.painting import Painting, Picture, painting_of
+from parapoint.files.ply_rewriting import has_strips, rewrite_ply
+from parapoint.files.point_writers import write_points
+from parapoint.files.reading import Polygons, faults_of
+from parapoint.files.targets import checked_target
+from parapoint.surfaces.parameterization import Charted
+from parapoint.surfaces.surface import BoolArray, FloatArray, PointCloud
+from parapoint.textures.baking import LARGEST
+from parapoint.textures.checkerboard import checkerboard
+from parapoint.textures.repainting import coloured, repainted
+
+logger = logging.getLogger("parapoint")
+
+REWRITTEN = {(".obj", ".obj"), (".ply", ".ply"), (".glb", ".glb"), (".gltf", ".glb")}
+"""Endings of an input and an output between which all but the UVs is kept."""
+CHECKER_FIELDS = 32
+"""Fields along a side of the checkerboard."""
+
+
+@dataclass(frozen=True)
+class MeshOutput:
+    """What is to be written of a mesh, known before it is unwrapped.
+
+    Attributes:
+        given: the mesh as it was read.
+        source: the file that it was read from.
+        out: the file to write.
+        texture: texels along a side of the texture.
+        margin: texels around each chart that repeat its edge.
+        asked: whether a texture was asked for.
+        painting: what the file paints on its triangles, or None.
+        chosen: (F,) the triangles that are written, or None for all.
+        per_vertex: whether each vertex is to have one uv.
+    """
+
+    given: Polygons
+    source: Path
+    out: Path
+    texture: int
+    margin: int
+    asked: bool
+    painting: Painting | None
+    chosen: BoolArray | None = None
+    per_vertex: bool = False
+
+    @property
+    def is_rewritten(self) -> bool:
+        """Whether the file is copied with new UVs, and all else stays."""
+        pair = (self.source.suffix.lower(), self.out.suffix.lower())
+        if pair not in REWRITTEN or self.chosen is not None or self.per_vertex:
+            return False
+        return pair[0] != ".ply" or not has_strips(self.source)
+
+    @property
+    def has_picture(self) -> bool:
+        """Whether a picture is written beside the file."""
+        ending = self.out.suffix.lower()
+        if self.per_vertex or ending not in SIDES:
+            return False
+        if self.is_rewritten and ending == ".obj":
+            return self.shows_old or not libraries(self.source)[0]
+        return ending == ".obj" or self.asked or self.painting is not None
+
+    @property
+    def shows_old(self) -> bool:
+        """Whether the texture shows what the file painted with pictures on its mesh."""
+        return self.painting is not None and self.painting.largest > 0
+
+    def check(self, *, force: bool) -> None:
+        """Check all that writing could fail of, before any work.
+
+        Raises:
+            InputError: a file beside `out` may not be replaced; the input cannot be written anew.
+        """
+        if self.has_picture:
+            sides = SIDES[self.out.suffix.lower()]
+            checked_target(self.out, sides=sides, inputs=[self.source], force=force)
+        if self.is_rewritten and self.out.suffix.lower() == ".glb":
+            with faults_of(self.source):
+                check_rewritable(self.source)
+
+    def picture(self, placed: Charted) -> Picture:
+        """What the texture shows: what the file does, or a checkerboard."""
+        if self.painting is not None:
+            chosen = self.painting if self.chosen is None else self.painting.of_faces(self.chosen)
+            return repainted(placed, chosen, self.texture, self.margin)
+        if self.given.colours is not None and self.chosen is None:
+            return coloured(placed, self.given.colours, self.texture, self.margin)
+        return checkerboard(CHECKER_FIELDS, max(1, self.texture // CHECKER_FIELDS))
+
+    def write(self, placed: Charted, picture: Picture) -> dict[str, object]:
+        """Write the mesh with its map in the unit square; facts of the writing."""
+        if self.per_vertex:
+            write_points(self.out, PointCloud(placed.mesh.vertices), _one_each(placed))
+            return {}
+        if self.is_rewritten:
+            rewrite: dict[str, Callable[[Charted, Picture], dict[str, object]]] = {
+                ".obj": self._rewrite_obj,
+                ".ply": self._rewrite_ply,
+                ".glb": self._rewrite_gltf,
+            }
+            return rewrite[self.out.suffix.lower()](placed, picture)
+        self._warn_of_extras()
+        if self.out.suffix.lower() == ".npz":
+            write_npz(self.out, placed)
+        elif self.out.suffix.lower() == ".ply" and not self.has_picture:
+            write_ply(self.out, placed)
+        else:
+            write_textured(self.out, placed, picture)
+        return {}
+
+    def _rewrite_obj(self, placed: Charted, picture: Picture) -> dict[str, object]:
+        named, has_pictures = libraries(self.source)
+        material = None
+        if not named:
+            material = write_material(self.out, picture)
+        elif has_pictures:
+            material = write_library(self.out, picture if self.shows_old else None, named)
+        split = rewrite_obj(
+            self.source,
+            self.out,
+            placed.map,
+            self.given.places,
+            material=material,
+            keeps_libraries=material is None,
+        )
+        return self._split(split)
+
+    def _rewrite_ply(self, placed: Charted, picture: Picture) -> dict[str, object]:
+        name = write_picture(self.out, picture).name if self.has_picture else None
+        places = self.given.places
+        return self._split(rewrite_ply(self.source, self.out, placed.map, places, picture=name))
+
+    def _rewrite_gltf(self, placed: Charted, picture: Picture) -> dict[str, object]:
+        uv_set = rewrite_gltf(self.source, self.out, placed.map, picture[..., :3])
+        if uv_set != "TEXCOORD_0":
+            logger.warning(
+                "%s: its textures keep their own UVs; the new ones are its UV set %s",
+                self.out,
+                uv_set,
+            )
+        return {"uv_set": uv_set}
+
+    def _split(self, count: int) -> dict[str, object]:
+        """The fact that polygons became triangles, with a warning."""
+        if count:
+            logger.warning(
+                "%s: the seam runs through %d polygons: they became triangles", self.out, count
+            )
+        return {"polygons_split": count}
+
+    @property
+    def _keeper(self) -> str:
+        """The ending of a file that would keep all but the UVs; "" for none."""
+        is_whole = self.chosen is None and not self.per_vertex
+        own = self.source.suffix.lower()
+        return next((out for given, out in REWRITTEN if given == own and is_whole), "")
+
+    def _warn_of_extras(self) -> None:
+        shown = {"old UVs", "colours"} if self.painting is not None else {"colours"}
+        left = [name for name in self.given.extras if name not in shown]
+        if left:
+            logger.warning(
+                "%s: positions, triangles, new UVs and colours are written; left out: %s%s",
+                self.out,
+                ", ".join(left),
+                f". A {kept} file would keep them" if (kept := self._keeper) else "",
+            )
+
+
+def mesh_output(
+    given: Polygons,
+    source: str,
+    out: str,
+    texture: int | None,
+    margin: int,
+    *,
+    chosen: BoolArray | None = None,
+    per_vertex: bool = False,
+) -> MeshOutput:
+    """What is to be written of a mesh; its texture is no coarser than the pictures that it shows.
+
+    Raises:
+        InputError: a picture of the mesh cannot be read.
+    """
+    with faults_of(Path(source)):
+        painting = painting_of(Path(source), given.polygon_of, given.uv)
+    size = texture or min(max(TEXTURE, painting.largest if painting else 0), LARGEST)
+    return MeshOutput(
+        given,
+        Path(source),
+        Path(out),
+        size,
+        margin,
+        texture is not None,
+        painting,
+        chosen,
+        per_vertex,
+    )
+
+
+def _one_each(placed: Charted) -> FloatArray:
+    """(V, 2) one of the uvs of each vertex; of a vertex without faces the middle."""
+    uv = np.full((len(placed.mesh.vertices), 2), 0.5)
+    uv[placed.mesh.faces[::-1]] = placed.map.uv[placed.map.corners[::-1]]
+    return uv

@@ -1,0 +1,85 @@
+"""What a mesh shows through its old UVs, painted anew into the texture of a new map."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from parapoint.files.attributes import unit_colours
+from parapoint.files.painting import WHITE, Painting, Picture
+from parapoint.surfaces.parameterization import Charted
+from parapoint.surfaces.surface import FloatArray
+from parapoint.textures.baking import MARGIN, dilated, painted
+from parapoint.textures.texels import texels
+
+
+def repainted(charted: Charted, painting: Painting, size: int, margin: int = MARGIN) -> Picture:
+    """(size, size, 3 or 4) the texture of a mesh with what its file paints on it.
+
+    Pictures repeat outside of the unit square, and are interpolated between their texels. Four
+    channels where a picture has an alpha.
+
+    Args:
+        charted: the mesh, and its new map in the unit square.
+        painting: what is painted on its triangles, in their order.
+        size: texels along a side.
+        margin: texels around each chart that repeat its edge.
+    """
+    shown = texels(charted, size)
+    has_alpha = any(
+        one.picture is not None and one.picture.shape[2] == 4 for one in painting.materials
+    )
+    width = 4 if has_alpha else 3
+
+    def values(_: FloatArray, rows: slice) -> FloatArray:
+        faces = shown.faces[rows]
+        weights = np.maximum(shown.weights(rows), 0)  # beyond the old chart is another one
+        weights /= weights.sum(axis=1, keepdims=True)
+        uv = np.einsum("nc,ncd->nd", weights, painting.uv[faces])
+        out = np.full((len(faces), width), 255.0)
+        of = painting.material_of[faces]
+        for number in np.unique(of).tolist():
+            material, here = painting.materials[number], of == number
+            out[here, :3] = material.colour
+            if material.picture is not None:
+                out[here] = _seen(material.picture, uv[here], width)
+        return out
+
+    flat = painted(shown, width, np.uint8, values)
+    return dilated(flat, shown, margin).astype(np.uint8, copy=False)
+
+
+def coloured(
+    charted: Charted, colours: npt.NDArray[np.generic], size: int, margin: int = MARGIN
+) -> Picture:
+    """(size, size, 3) the texture of a mesh whose vertices (V,) have colours, as `PointCloud`."""
+    shown = texels(charted, size)
+    known = 255 * unit_colours(colours[:, :3]).astype(np.float64)
+
+    def values(_: FloatArray, rows: slice) -> FloatArray:
+        corners = known[charted.mesh.faces[shown.faces[rows]]]
+        return np.asarray(np.einsum("nc,ncd->nd", shown.weights(rows), corners))
+
+    flat = painted(shown, 3, np.uint8, values)
+    return dilated(flat, shown, margin).astype(np.uint8, copy=False)
+
+
+def _seen(picture: Picture, uv: FloatArray, width: int) -> FloatArray:
+    """(n, width) a picture at points (n, 2), where it repeats; white where a point is NaN."""
+    height, across, channels = picture.shape
+    known = np.asarray(np.isfinite(uv).all(axis=1))
+    at = np.where(known[:, None], uv, 0)
+    at = np.stack([(1 - at[:, 1]) * height, at[:, 0] * across], axis=1) - 0.5
+    low = np.floor(at)
+    part = at - low
+    line, column = low.astype(np.int64).T
+    total = np.zeros((len(uv), channels))
+    for down in (0, 1):
+        for right in (0, 1):
+            weight = np.abs(1 - down - part[:, 0]) * np.abs(1 - right - part[:, 1])
+            texel = picture[(line + down) % height, (column + right) % across]
+            total += weight[:, None] * texel
+    out = np.full((len(uv), width), 255.0)
+    out[known, :channels] = total[known, :width]
+    out[~known, :3] = WHITE
+    return out

@@ -1,0 +1,1 @@
+"""The static site of reference results, and their page in Markdown."""

@@ -1,0 +1,60 @@
+"""The reference results as one page of Markdown: docs/RESULTS.md."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+
+from parapoint.errors import InputError
+from parapoint.files.targets import complete_file
+from reports.contents import Contents, contents, suite_title
+from reports.tables import formats
+from reports.tables import suites as tables
+from reports.tables.notes import load_notes, version_notes
+
+TOLD = ("overall", "success", "conformality", "published", "kinds", "cuts", "seeds")
+"""Names of the tables on the page, of those that a suite has."""
+MARK = "<!-- Written by `python -m reports markdown`: "
+"""How the page begins; a page that does not is not overwritten."""
+
+
+def write(sources: Sequence[Path], out: Path) -> Path:
+    """Write the page; its path.
+
+    Raises:
+        InputError: a folder holds no results; `out` is there and not ours.
+    """
+    if out.exists() and not out.read_text(encoding="utf-8", errors="replace").startswith(MARK):
+        raise InputError(f"{out}: is in the way and not ours; take another --out")
+    suites = [suite for source in sources for suite in contents(source)]
+    command = shlex.join(
+        ["python", "-m", "reports", "markdown", *map(str, sources), "--out", str(out)]
+    )
+    parts = [
+        f"{MARK}change the results, not this page. -->",
+        "# Reference results",
+        f"Made by `{command}`. Validity comes before rank (README, *How to read the tables*).",
+        *(part for suite in suites for part in _suite(suite)),
+    ]
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with complete_file(out) as stream:
+        stream.write(("\n\n".join(parts) + "\n").encode())
+    return out
+
+
+def _suite(suite: Contents) -> list[str]:
+    """The paragraphs of a suite: its tables, and what must be known of its run."""
+    made = [table for table in tables.tables(suite) if table.name in TOLD]
+    loads = [row.load for row in suite.rows if row.load is not None]
+    load = f"Load while cells ran: {min(loads):.1f} to {max(loads):.1f}." if loads else ""
+    maps = sum(row.status == "ok" for row in suite.rows)
+    about = (
+        f"{len(suite.methods)} methods on {len(suite.cases)} models: {len(suite.rows)} cells, "
+        f"{maps} maps. {load}"
+    )
+    return [
+        f"## {suite_title(suite.suite)} (`{suite.suite}`)",
+        " ".join([about.strip(), *version_notes(suite), *load_notes(suite)]),
+        *(formats.markdown(table).strip() for table in made),
+    ]

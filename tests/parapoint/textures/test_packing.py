@@ -1,0 +1,84 @@
+"""Charts are packed at one scale, none mirrored, none on another, and near to xatlas's density."""
+
+import numpy as np
+import pytest
+import xatlas
+from scipy.spatial import cKDTree
+
+from parapoint.surfaces.parameterization import Charted, Parameterization
+from parapoint.surfaces.surface import Mesh
+from parapoint.textures.packing import packed
+
+CHARTS = 30
+
+
+def doubled_areas(uv, corners) -> np.ndarray:
+    a, b, c = (uv[corners[:, k]] for k in range(3))
+    return (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+
+
+def flags(count: int = CHARTS) -> Charted:
+    """Flags of two triangles of many sizes, all on the same place of the plane."""
+    rng = np.random.default_rng(0)
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    uv = [square * rng.uniform(0.1, 2, 2) + rng.normal(size=2) for _ in range(count)]
+    corners = np.concatenate([np.array([[0, 1, 2], [0, 2, 3]]) + 4 * k for k in range(count)])
+    uv = np.concatenate(uv)
+    return Charted(
+        Mesh(np.column_stack([uv, 0 * uv[:, 0]]), corners), Parameterization(uv, corners)
+    )
+
+
+@pytest.mark.parametrize("border", [1 / 256, 1 / 64])
+def test_charts_lie_apart_at_one_scale(border) -> None:
+    given = flags()
+    made = packed(given, border)
+    uv = made.map.uv
+    ratio = doubled_areas(uv, made.map.corners) / doubled_areas(given.map.uv, given.map.corners)
+    assert ratio.min() == pytest.approx(ratio.max(), rel=1e-9)
+    assert ratio.min() > 0
+    assert uv.min() == pytest.approx(border, abs=1e-9)
+    assert uv.max() == pytest.approx(1 - border, abs=1e-9)
+    # Points along the sides of each flag are as far from those of others.
+    steps = np.linspace(0, 1, 200)[:, None]
+    sides = [
+        np.concatenate(
+            [a + steps * (b - a) for a, b in zip(ring, np.roll(ring, 1, 0), strict=True)]
+        )
+        for ring in uv.reshape(CHARTS, 4, 2)
+    ]
+    for k, points in enumerate(sides):
+        others = cKDTree(np.concatenate(sides[:k] + sides[k + 1 :]))
+        assert others.query(points)[0].min() > 0.9 * border
+    filled = np.abs(doubled_areas(uv, made.map.corners)).sum() / 2
+    assert filled > (0.8 * xatlas_fill(given) if border < 0.01 else 0.4)
+
+
+def xatlas_fill(given: Charted) -> float:
+    """Share of its square that xatlas fills with the charts by default, at a like distance."""
+    atlas = xatlas.Atlas()
+    uv, corners = given.map.uv.astype(np.float32), given.map.corners.astype(np.uint32)
+    atlas.add_uv_mesh(uv, corners)
+    options = xatlas.PackOptions()
+    options.padding = 4
+    atlas.generate(xatlas.ChartOptions(), options)
+    own = atlas[0][2] * [atlas.width, atlas.height]
+    assert len(own) == len(uv)
+    return np.abs(doubled_areas(own, corners)).sum() / 2 / max(atlas.width, atlas.height) ** 2
+
+
+def test_a_chart_alone_is_turned_to_its_smallest_square() -> None:
+    turn = np.array([[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]])
+    uv = np.array([[0, 0], [3, 0], [3, 3], [0, 3]]) @ turn
+    mesh = Mesh(np.column_stack([uv, 0 * uv[:, 0]]), [[0, 1, 2], [0, 2, 3]])
+    made = packed(Charted(mesh, Parameterization(uv, mesh.faces)), 0.1)
+    assert np.abs(doubled_areas(made.map.uv, made.map.corners)).sum() / 2 > 0.63
+
+
+def test_a_chart_without_area_is_moved_as_it_is() -> None:
+    given = flags(3)
+    uv = given.map.uv.copy()
+    uv[8:] = uv[8]
+    made = packed(Charted(given.mesh, Parameterization(uv, given.map.corners)))
+    assert np.isfinite(made.map.uv).all()
+    assert np.ptp(made.map.uv[8:], axis=0).max() < 1e-9

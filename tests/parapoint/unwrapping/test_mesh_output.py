@@ -1,0 +1,415 @@
+"""What `unwrap` writes of a mesh keeps what the file says of it, and shows what it showed."""
+
+import io
+import json
+import struct
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from PIL import Image
+
+from parapoint import InputError, Mesh, Parameterization
+from parapoint.commands.mesh_output import mesh_output
+from parapoint.files.gltf import opened
+from parapoint.files.mesh_writers import write_glb, write_ply
+from parapoint.files.painting import painting_of
+from parapoint.files.ply import Table
+from parapoint.files.ply import opened as opened_ply
+from parapoint.files.reading import read_parameterized, read_polygons
+from parapoint.surfaces.parameterization import Charted
+
+SIDE = 4
+"""Quads along a side of the sheet."""
+BLUE, RED, GREEN = (20, 40, 200), (200, 30, 30), (10, 220, 90)
+
+
+def old_picture() -> np.ndarray:
+    """(64, 64, 3) a picture that has another colour at each place."""
+    line, column = np.mgrid[:64, :64]
+    return np.stack([4 * column, 4 * line, 255 - 2 * (line + column)], axis=2).astype(np.uint8)
+
+
+def grid() -> tuple[np.ndarray, list[tuple[int, ...]]]:
+    """(25, 3) points of a bent sheet, and its quads."""
+    x, y = np.meshgrid(np.arange(SIDE + 1.0), np.arange(SIDE + 1.0), indexing="ij")
+    points = np.stack([x, y, 0.1 * x**2], axis=2).reshape(-1, 3)
+    index = np.arange(len(points)).reshape(SIDE + 1, -1)
+    quads = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]], axis=2)
+    return points, [tuple(quad) for quad in quads.reshape(-1, 4).tolist()]
+
+
+def new_map(faces: np.ndarray, points: np.ndarray) -> Charted:
+    """Another map: turned by a right angle, and cut in two where x is 2; no polygon is split."""
+    half = (points[faces][:, :, 0].mean(axis=1) > 2).astype(np.int64)
+    flat = np.stack([1 - points[:, 1] / SIDE, points[:, 0] / SIDE], axis=1) * 0.8 + 0.05
+    uv = np.concatenate([flat, flat + np.array([0.0, 0.1])])
+    return Charted(Mesh(points, faces), Parameterization(uv, faces + half[:, None] * len(points)))
+
+
+@pytest.fixture
+def textured(tmp_path):
+    """The sheet as OBJ: one half shows a picture, one row is red, the last is without material."""
+    points, quads = grid()
+    Image.fromarray(old_picture()).save(tmp_path / "old one.png")
+    (tmp_path / "old.mtl").write_text(
+        "newmtl shown\nKd 1 1 1\nmap_Kd -s 1 1 1 old one.png\nmap_Bump bumps.png\nNs 12\n"
+        f"newmtl red\nKd {RED[0] / 255} {RED[1] / 255} {RED[2] / 255}\n"
+    )
+    lines = ["mtllib old.mtl", *(f"v {x} {y} {z}" for x, y, z in points)]
+    lines += [f"vt {x / SIDE} {y / SIDE}" for x, y, _ in points]
+    lines += ["vn 0 0 1", "g left", "usemtl shown"]
+    for k, quad in enumerate(quads):
+        if k == SIDE * (SIDE - 1):
+            lines += ["g right", "usemtl red"]
+        lines.append("f " + " ".join(f"{at + 1}/{at + 1}/1" for at in quad))
+    path = tmp_path / "sheet.obj"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def written(source, out, texture=256):
+    """The new map of a file, once it has been written."""
+    given = read_polygons(source)
+    placed = new_map(given.mesh.faces, given.mesh.vertices)
+    output = mesh_output(given, str(source), str(out), texture, 4)
+    output.check(force=False)
+    output.write(placed, output.picture(placed))
+    return placed
+
+
+def seen(path, picture, points):
+    """(n, 3) the colours of a picture where the middles of a file's faces at `points` lie."""
+    mesh, own = read_parameterized(path)
+    middles = mesh.vertices[mesh.faces].mean(axis=1)
+    at = own.uv[own.corners].mean(axis=1)
+    face = ((points[:, None] - middles[None]) ** 2).sum(axis=2).argmin(axis=1)
+    height, width = picture.shape[:2]
+    return picture[((1 - at[face, 1]) * height).astype(int), (at[face, 0] * width).astype(int), :3]
+
+
+def middles(path) -> np.ndarray:
+    mesh = read_polygons(path).mesh
+    return mesh.vertices[mesh.faces].mean(axis=1)
+
+
+def shows_the_old(path, picture, source) -> None:
+    """Check that a file shows with `picture` what the textured sheet did."""
+    at = middles(source)
+    before = seen(source, old_picture(), at)
+    before[at[:, 0] > SIDE - 1] = RED
+    after = seen(path, picture, at).astype(int)
+    assert np.abs(after - before).max() <= 6  # a texel of the old picture is four grey levels
+
+
+@pytest.mark.parametrize("ending", [".obj", ".ply", ".glb"])
+def test_an_old_texture_is_baked_into_the_new_uvs(ending, textured, tmp_path) -> None:
+    out = tmp_path / f"new{ending}"
+    written(textured, out)
+    if ending == ".glb":
+        tree = opened(out)
+        (tmp_path / "new.png").write_bytes(tree.image(0))
+    picture = np.asarray(Image.open(tmp_path / "new.png"))
+    if ending == ".obj":  # the red material has no picture, before or after
+        library = (tmp_path / "new.mtl").read_text()
+        assert "map_Kd new.png" in library
+        assert library.count("newmtl") == 2
+        assert "Ns 12" in library
+        assert "ump" not in library
+        text = out.read_text()
+        assert text.startswith("mtllib new.mtl\n")
+        assert "old.mtl" not in text
+        assert "usemtl red" in text
+        assert text.count("\nf ") == SIDE**2
+    shows_the_old(out, picture, textured)
+
+
+def test_a_library_whose_pictures_are_missing_shows_none(textured, tmp_path, caplog) -> None:
+    (tmp_path / "old one.png").unlink()
+    written(textured, tmp_path / "new.obj")
+    assert "map" not in (tmp_path / "new.mtl").read_text().partition("# ")[0]
+    assert "left out: map_Bump, map_Kd" in caplog.text
+
+
+def test_a_picture_that_cannot_be_read_is_one_line(textured, tmp_path) -> None:
+    (tmp_path / "old one.png").write_bytes(b"\x89PNG nothing")
+    with pytest.raises(InputError, match=r"sheet\.obj: .*old one\.png: is no picture"):
+        written(textured, tmp_path / "new.obj")
+
+
+def ply_sheet(path, text) -> None:
+    """The sheet as PLY with all sorts of properties, of either encoding."""
+    points, quads = grid()
+    count = np.arange(len(points))
+    names = [("double x", "d"), ("double y", "d"), ("double z", "d"), ("float u", "f")]
+    names += [("float v", "f"), ("uchar red", "B"), ("short q", "h")]
+    vertex = np.column_stack([points, points[:, :2] / SIDE, count, -count])
+    kind = "ascii" if text else "binary_big_endian"
+    header = ["ply", f"format {kind} 1.0", "comment TextureFile old one.png", "comment by hand"]
+    header += [f"element vertex {len(points)}", *(f"property {name}" for name, _ in names)]
+    header += [f"element face {len(quads)}", "property list uchar uint vertex_indices"]
+    header += ["property uchar flags", "element edge 2", "property int vertex1"]
+    header += ["property int vertex2", "end_header", ""]
+    rows = [
+        *(
+            (codes, row)
+            for codes in ["".join(code for _, code in names)]
+            for row in vertex.tolist()
+        ),
+        *(("B4IB", [4, *quad, k]) for k, quad in enumerate(quads)),
+        *(("2i", row) for row in ([0, 1], [1, 2])),
+    ]
+    if text:
+        body = "\n".join(" ".join(f"{value:.9g}" for value in row) for _, row in rows).encode()
+    else:
+        body = b"".join(
+            struct.pack(
+                f">{codes}",
+                *(v if c in "df" else int(v) for v, c in zip(row, spelt(codes), strict=True)),
+            )
+            for codes, row in rows
+        )
+    path.write_bytes("\n".join(header).encode() + body)
+
+
+def spelt(codes) -> str:
+    """Codes of struct without numbers of repetitions."""
+    return codes.replace("4I", "IIII").replace("2i", "ii")
+
+
+def elements(path) -> tuple[list[str], dict[str, Table]]:
+    """The comments and the elements of a PLY file."""
+    comments, tables = opened_ply(path.read_bytes())
+    return comments, {table.name: table for table in tables}
+
+
+@pytest.mark.parametrize("text", [True, False])
+def test_a_ply_file_keeps_all_but_the_uvs(text, tmp_path) -> None:
+    source, out = tmp_path / "old.ply", tmp_path / "new.ply"
+    Image.fromarray(old_picture()).save(tmp_path / "old one.png")
+    ply_sheet(source, text)
+    placed = written(source, out)
+    _, before = elements(source)
+    comments, after = elements(out)
+    assert comments == ["TextureFile new.png", "by hand"]
+    count, seam = before["vertex"].count, SIDE + 1  # one copy of each vertex where x is 2
+    assert after["vertex"].count == count + seam
+    assert list(after["vertex"].columns) == ["x", "y", "z", "red", "q", "s", "t"]
+    for name in ("x", "y", "z", "red", "q"):
+        kept = after["vertex"].columns[name].values
+        assert kept.dtype == before["vertex"].columns[name].values.dtype
+        assert np.array_equal(kept[:count], before["vertex"].columns[name].values)
+    assert np.array_equal(after["face"].columns["flags"].values, np.arange(SIDE**2))
+    assert after["edge"].columns["vertex2"].values.tolist() == [1, 2]
+    index = after["face"].columns["vertex_indices"].values
+    original = -after["vertex"].columns["q"].values[index]
+    assert np.array_equal(original, before["face"].columns["vertex_indices"].values)
+    wedges = after["face"].columns["texcoord"].values.reshape(-1, 2)
+    assert_allclose(wedges[:, 0], after["vertex"].columns["s"].values[index], atol=1e-6)
+    own = read_parameterized(out)[1]
+    assert_allclose(own.uv[own.corners], placed.map.uv[placed.map.corners])
+    at = middles(source)
+    after_colours = seen(out, np.asarray(Image.open(tmp_path / "new.png")), at).astype(int)
+    assert np.abs(after_colours - seen(source, old_picture(), at)).max() <= 6
+
+
+def test_a_seam_through_polygons_of_a_ply_file_makes_triangles(tmp_path) -> None:
+    source, out = tmp_path / "old.ply", tmp_path / "new.ply"
+    ply_sheet(source, text=False)
+    given = read_polygons(source)
+    apart = np.arange(3 * len(given.mesh.faces)).reshape(-1, 3)  # each triangle is a chart
+    uv = np.random.default_rng(0).random((apart.size, 2))
+    placed = Charted(given.mesh, Parameterization(uv, apart))
+    output = mesh_output(given, str(source), str(out), None, 4)
+    facts = output.write(placed, output.picture(placed))
+    assert facts["polygons_split"] == SIDE**2
+    flags = elements(out)[1]["face"].columns["flags"].values
+    assert flags.tolist() == [k // 2 for k in range(2 * SIDE**2)]
+    mesh, own = read_parameterized(out)
+    assert_allclose(own.uv[own.corners], uv[apart])
+    assert np.array_equal(mesh.vertices[mesh.faces], given.mesh.vertices[given.mesh.faces])
+
+
+def glb_of(tree: dict, body: bytes) -> bytes:
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text
+    chunks += struct.pack("<I4s", len(body), b"BIN\0") + body
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def gltf_sheet(path, materials) -> None:
+    """The sheet as GLB: colours, a second UV set, an animation, drawn twice, once mirrored."""
+    points, quads = grid()
+    faces = np.array([(a, b, c) for a, b, c, d in quads] + [(a, c, d) for a, b, c, d in quads])
+    uv = points[:, :2] / SIDE * [1, -1] + [0, 1]
+    colours = np.zeros((len(points), 4), np.uint8)
+    colours[:, 0], colours[:, 3] = np.arange(len(points)), 255
+    body, views, accessors = b"", [], []
+
+    def add(values, kind, component, **more):
+        nonlocal body
+        data = np.ascontiguousarray(values).tobytes()
+        views.append({"buffer": 0, "byteOffset": len(body), "byteLength": len(data)})
+        body += data + b"\0" * (-len(data) % 4)
+        item = {"bufferView": len(views) - 1, "componentType": component, "count": len(values)}
+        accessors.append(item | {"type": kind} | more)
+        return len(accessors) - 1
+
+    low, high = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    attributes = {
+        "POSITION": add(points.astype(np.float32), "VEC3", 5126, min=low, max=high),
+        "COLOR_0": add(colours, "VEC4", 5121, normalized=True),
+        "TEXCOORD_0": add(uv.astype(np.float32), "VEC2", 5126),
+        "TEXCOORD_1": add((uv / 2).astype(np.float32), "VEC2", 5126),
+    }
+    indices = add(faces.astype(np.uint16).reshape(-1, 1), "SCALAR", 5123)
+    times = add(np.array([[0.0], [1.0]], np.float32), "SCALAR", 5126, min=[0], max=[1])
+    moves = add(np.eye(3, dtype=np.float32)[:2], "VEC3", 5126)
+    primitive = {"attributes": attributes, "indices": indices}
+    tree = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0, 1]}],
+        "nodes": [
+            {"mesh": 0, "name": "one"},
+            {"mesh": 0, "name": "other", "scale": [-1, 1, 1], "translation": [-9, 0, 0]},
+        ],
+        "meshes": [{"name": "sheet", "primitives": [primitive]}],
+        "materials": materials,
+        "animations": [
+            {
+                "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}],
+                "samplers": [{"input": times, "output": moves}],
+            }
+        ],
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{"byteLength": len(body)}],
+    }
+    if materials:
+        primitive["material"] = 0
+        tree["textures"] = [{"source": 0}]
+        tree["images"] = [{"uri": "old%20one.png"}]
+    path.write_bytes(glb_of(tree, body))
+
+
+SHOWN = [{"name": "cloth", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]
+
+
+@pytest.mark.parametrize("materials", [SHOWN, [{"name": "plain"}], []])
+def test_a_glb_file_keeps_all_but_the_uvs(materials, tmp_path, caplog) -> None:
+    source, out = tmp_path / "old.glb", tmp_path / "new.glb"
+    Image.fromarray(old_picture()).save(tmp_path / "old one.png")
+    gltf_sheet(source, materials)
+    before = read_polygons(source)
+    apart = np.arange(3 * len(before.mesh.faces)).reshape(-1, 3)
+    uv = np.random.default_rng(0).random((apart.size, 2))
+    output = mesh_output(before, str(source), str(out), 64, 4)
+    output.check(force=False)
+    placed = Charted(before.mesh, Parameterization(uv, apart))
+    facts = output.write(placed, output.picture(placed))
+    (tmp_path / "old one.png").unlink()  # it is inside the new file
+
+    after = read_polygons(out)
+    corners = before.mesh.vertices[before.mesh.faces]
+    assert_allclose(after.mesh.vertices[after.mesh.faces], corners, atol=1e-6)
+    tree = opened(out)
+    number = 2 if materials == SHOWN else 0
+    assert facts["uv_set"] == f"TEXCOORD_{number}"
+    assert ("keep their own UVs" in caplog.text) == (number == 2)
+    begin = 0
+    assert [mesh["name"] for mesh in tree.tree["meshes"]] == ["sheet", "sheet"]
+    assert [node["name"] for node in tree.tree["nodes"]] == ["one", "other"]
+    for primitive, transform, *_ in tree.placed_primitives():
+        attributes = primitive["attributes"]
+        faces = tree.triangles(primitive)
+        found = tree.accessor(attributes[f"TEXCOORD_{number}"])[faces] * [1, -1] + [0, 1]
+        order = slice(None, None, -1) if np.linalg.det(transform) < 0 else slice(None)
+        assert_allclose(found[:, order], uv[apart[begin : begin + len(faces)]], atol=1e-6)
+        begin += len(faces)
+        red = np.rint(255 * tree.accessor(attributes["COLOR_0"])[:, 0]).astype(int)
+        assert_allclose(grid()[0][red], tree.accessor(attributes["POSITION"]), atol=1e-6)
+        second = tree.accessor(attributes["TEXCOORD_1"])
+        assert_allclose(second[:, 0], grid()[0][red, 0] / SIDE / 2, atol=1e-6)
+    sampler = tree.tree["animations"][0]["samplers"][0]
+    assert tree.accessor(sampler["output"]).tolist() == np.eye(3)[:2].tolist()
+    if materials == SHOWN:
+        with Image.open(io.BytesIO(tree.image(0))) as image:
+            assert np.array_equal(np.asarray(image), old_picture())
+    elif not materials:
+        assert tree.tree["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] == {"index": 0}
+    used = {
+        i
+        for mesh in tree.tree["meshes"]
+        for p in mesh["primitives"]
+        for i in p["attributes"].values()
+    }
+    assert len(tree.tree["accessors"]) == len(used) + 2 + 2  # and indices, and the animation
+
+
+def test_a_glb_file_as_obj_shows_its_texture(tmp_path) -> None:
+    Image.fromarray(old_picture()).save(tmp_path / "old one.png")
+    gltf_sheet(tmp_path / "old.glb", SHOWN)
+    tree = opened(tmp_path / "old.glb").tree
+    tree["nodes"] = tree["nodes"][:1]
+    tree["scenes"][0]["nodes"] = [0]
+    (tmp_path / "one.glb").write_bytes(glb_of(tree, opened(tmp_path / "old.glb").chunk))
+    written(tmp_path / "one.glb", tmp_path / "new.obj")
+    at = middles(tmp_path / "one.glb")
+    after = seen(tmp_path / "new.obj", np.asarray(Image.open(tmp_path / "new.png")), at).astype(int)
+    assert np.abs(after - seen(tmp_path / "one.glb", old_picture(), at)).max() <= 6
+
+
+def test_instances_are_refused_before_any_work(tmp_path) -> None:
+    gltf_sheet(tmp_path / "old.glb", [])
+    source = opened(tmp_path / "old.glb")
+    source.tree["nodes"][0]["extensions"] = {
+        "EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 6}}
+    }
+    (tmp_path / "many.glb").write_bytes(glb_of(source.tree, source.chunk))
+    given = read_polygons(tmp_path / "many.glb")
+    output = mesh_output(given, str(tmp_path / "many.glb"), str(tmp_path / "new.glb"), None, 4)
+    with pytest.raises(InputError, match=r"many\.glb: draws instances"):
+        output.check(force=False)
+
+
+def test_colours_of_vertices_are_painted(tmp_path) -> None:
+    source, out = tmp_path / "old.ply", tmp_path / "new.glb"
+    points, quads = grid()
+    vertex = [f"{x} {y} {z} {40 * round(x)} {40 * round(y)} 7" for x, y, z in points]
+    names = [*"xyz", "red", "green", "blue"]
+    header = ["ply", "format ascii 1.0", f"element vertex {len(points)}"]
+    header += [f"property {'double' if n in 'xyz' else 'uchar'} {n}" for n in names]
+    header += [f"element face {len(quads)}", "property list uchar int vertex_indices", "end_header"]
+    faces = ["4 " + " ".join(map(str, quad)) for quad in quads]
+    source.write_text("\n".join([*header, *vertex, *faces]) + "\n")
+    written(source, out)
+    picture = tmp_path / "new.png"
+    picture.write_bytes(opened(out).image(0))
+    at = middles(source)
+    wanted = np.column_stack([40 * at[:, :2], np.full(len(at), 7)])
+    assert np.abs(seen(out, np.asarray(Image.open(picture)), at) - wanted).max() <= 2
+
+
+def test_a_side_file_of_the_user_stays(tmp_path) -> None:
+    ply_sheet(tmp_path / "old.ply", text=False)
+    Image.fromarray(old_picture()).save(tmp_path / "old one.png")
+    (tmp_path / "new.png").write_bytes(b"mine")
+    given = read_polygons(tmp_path / "old.ply")
+    output = mesh_output(given, str(tmp_path / "old.ply"), str(tmp_path / "new.ply"), None, 4)
+    with pytest.raises(InputError, match=r"new\.png: is a file of yours"):
+        output.check(force=False)
+
+
+def test_one_colour_alone_is_no_painting(tmp_path) -> None:
+    points, quads = grid()
+    faces = np.array([(a, b, c) for a, b, c, _ in quads])
+    placed = new_map(faces, points)
+    write_ply(tmp_path / "a.ply", placed)
+    given = read_polygons(tmp_path / "a.ply")
+    assert painting_of(tmp_path / "a.ply", given.polygon_of, given.uv) is None
+    write_glb(tmp_path / "a.glb", placed, old_picture())
+    given = read_polygons(tmp_path / "a.glb")
+    painting = painting_of(tmp_path / "a.glb", given.polygon_of, given.uv)
+    assert painting.largest == 64

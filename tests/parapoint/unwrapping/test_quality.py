@@ -1,0 +1,75 @@
+"""What a person wants to know of a map, with numbers worked out by hand."""
+
+import numpy as np
+import pytest
+
+from parapoint import Mesh, Parameterization
+from parapoint.surfaces.parameterization import Charted
+from parapoint.unwrapping.quality import quality
+
+
+def test_quality_by_hand() -> None:
+    # Two right triangles of a unit square; the second is shrunk to a tenth.
+    vertices = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    mesh = Mesh(vertices, [[0, 1, 2], [0, 2, 3]])
+    uv = np.array([[0, 0], [0.5, 0], [0.5, 0.5], [0.6, 0.6], [0.65, 0.65], [0.6, 0.65]])
+    found = quality(Charted(mesh, Parameterization(uv, [[0, 1, 2], [3, 4, 5]])), 1000)
+    assert found.starved == pytest.approx(0.5)
+    assert found.smallest_part == pytest.approx(2 / 101)
+    assert found.flipped == 0
+    assert found.charts == 2
+    assert found.seam == pytest.approx(2**0.5)
+    assert found.filled == pytest.approx(0.12625)
+    assert found.angle_worst == pytest.approx(0, abs=1e-9)
+    assert found.texels_per_unit == pytest.approx(1000 * 0.12625**0.5)
+    scale = (1 / 0.12625) ** 0.5
+    assert found.stretch_worst == pytest.approx(1 / (0.05 * scale))
+    assert found.stretch_mean == pytest.approx((0.5 * scale + 1 / (0.05 * scale)) / 2)
+    # Sheared by one: the right angle becomes one of 45 degrees.
+    sheared = Parameterization([[0, 0], [1, 0], [2, 1], [1, 1]], mesh.faces)
+    assert quality(Charted(mesh, sheared), 1).angle_worst == pytest.approx(45)
+    assert quality(Charted(mesh, sheared), 1).charts == 1
+    mirrored = Parameterization([[0, 0], [-1, 0], [-1, 1], [0, 1]], mesh.faces)
+    assert quality(Charted(mesh, mirrored), 1).flipped == 2
+
+
+@pytest.mark.parametrize("size", [1, 30])
+def test_lengths_are_told_in_the_size_of_the_surface(size: float) -> None:
+    """A square cut along its diagonal: the cut is √2 of the side, in any unit."""
+    corners = size * np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    mesh = Mesh(corners, [[0, 1, 2], [0, 2, 3]])
+    halves = np.array([[0, 0], [0.4, 0], [0.4, 0.4], [0.5, 0.5], [0.9, 0.9], [0.5, 0.9]])
+    found = quality(Charted(mesh, Parameterization(halves, [[0, 1, 2], [3, 4, 5]])), 100)
+    assert found.seam == pytest.approx(2**0.5)
+    assert found.texels_per_unit == pytest.approx(40 / size)
+    assert (found.stretch_mean, found.stretch_worst) == pytest.approx((1, 1))
+
+
+def test_angles_count_by_area_and_flat_images_as_flips() -> None:
+    """Nine tenths of a strip are kept, the last tenth is sheared by one, or flattened."""
+    points = np.array([[0.0, 0, 0], [9, 0, 0], [0, 1, 0], [9, 1, 0], [10, 0, 0], [10, 1, 0]])
+    faces = [[0, 1, 2], [1, 3, 2], [1, 4, 3], [4, 5, 3]]
+    kept, end = points[:, :2] / 20, np.array([[9.0, 0], [10, 0], [10, 1], [9, 1]]) / 20
+    rows = [[0, 1, 2], [1, 3, 2], [6, 7, 9], [7, 8, 9]]
+    found = {}
+    for name, moved in {"sheared": end + end[:, 1:] * [1, 0], "flat": end * [1, 0]}.items():
+        uv = np.concatenate([kept, moved])
+        found[name] = quality(Charted(Mesh(points, faces), Parameterization(uv, rows)), 64)
+    # The two sheared triangles swap an angle of 45 degrees for one of 90; the third stays.
+    assert found["sheared"].angle_worst == pytest.approx(45)
+    assert found["sheared"].angle_mean == pytest.approx(0.1 * (45 + 45 + 0) / 3)
+    assert (found["sheared"].flipped, found["flat"].flipped) == (0, 2)
+
+
+@pytest.mark.parametrize(("share", "is_seen"), [(0.05, True), (0.005, False)])
+def test_a_starved_part_is_seen_from_a_hundredth_of_the_surface_on(share, is_seen) -> None:
+    """A strip whose last part is ten times narrower in the plane."""
+    end = 1 - share
+    points = np.array([[0.0, 0, 0], [end, 0, 0], [end, 1, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0]])
+    faces = [[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2]]
+    uv = points[:, :2].copy()
+    uv[4:, 0] = end + share / 10
+    found = quality(Charted(Mesh(points, faces), Parameterization(uv, faces)), 64)
+    assert found.starved == pytest.approx(share)
+    ratio = 0.1 / (1 - 0.9 * share)
+    assert found.smallest_part == pytest.approx(ratio if is_seen else 1)
