@@ -62,9 +62,12 @@ What a method may count on, and what it must keep:
 - `packages` names the libraries whose versions are part of the method: results are run anew when
   one changes, as they are when the method's own source does, or that of what it imports from its
   own package or from this project.
+- `licence` names that of what runs, `citation` what to cite, as an entry of BibTeX: the report says
+  the one and gathers the other in `methods.bib`.
 
 A program that reads and writes OBJ files needs no code; it is run by
 `external(command="tool {input} {output}")`.
 
-A method of this package is a file here and a line in `baselines.registry.METHODS`.
+A method of this package is a file here and a line in `baselines.registry.METHODS`; whom to credit
+for it stands in `baselines.credits`.
 '''

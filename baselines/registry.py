@@ -23,6 +23,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal, Union, cast, get_args, get_origin, get_type_hints
 
+from baselines.credits import CREDITS, cited
 from parapoint import sources
 from parapoint.errors import InputError
 from parapoint.method import REPAIRED, REQUIREMENTS, Method
@@ -77,12 +78,16 @@ class Description:
         parameters: its fields and their defaults, as source text; "" for none.
         deterministic: whether it promises the same map for the same seed: "yes", "no", or "by its
             parameters"; ", with as many threads" where it depends on their number.
+        licence: of what runs; "" where a plugin does not say (class attribute `licence`).
+        citations: what to cite, as entries of BibTeX; a plugin's own is its attribute `citation`.
     """
 
     summary: str
     requires: tuple[str, ...]
     parameters: dict[str, str]
     deterministic: str
+    licence: str
+    citations: tuple[str, ...]
 
 
 def names() -> list[str]:
@@ -181,7 +186,22 @@ def describe(name: str) -> Description:
     promise = promise or "by its parameters"
     if promise != "no" and _imported_by(kind.__module__, "torch"):
         promise += ", with as many threads"
-    return Description(summary, tuple(sorted(kind.requires)), parameters, promise)
+    return Description(summary, tuple(sorted(kind.requires)), parameters, promise, *credit(name))
+
+
+def credit(name: str) -> tuple[str, tuple[str, ...]]:
+    """The licence of what a method runs, and what to cite, as entries of BibTeX.
+
+    Methods of the benchmark are not imported for it. A plugin says both as class attributes.
+
+    Raises:
+        InputError: there is no such method.
+    """
+    if name in CREDITS:
+        return CREDITS[name].licence, cited(CREDITS[name].keys)
+    kind = _class(name)
+    citation = str(getattr(kind, "citation", ""))
+    return str(getattr(kind, "licence", "")), (citation,) if citation else ()
 
 
 def source_hash(made: Method) -> str:

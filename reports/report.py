@@ -6,6 +6,7 @@ from pathlib import Path
 
 from benchmarks.running.scratch import MARK
 from parapoint.errors import InputError
+from reports import citing
 from reports.contents import contents
 from reports.page import pages as page
 from reports.page.sections import Section
@@ -21,9 +22,9 @@ def write(folder: Path, *, jobs: int, textured: bool = False, progress: Progress
     """Write the report on the results in `folder` to `folder`/report; the path of its index.
 
     report/tables/SUITE/*.tex, .md, .csv; report/figures/SUITE/*.pdf, .png, captions.md and
-    pictures/; report/index.html, report/models/SUITE/MODEL.html and what they share in
-    report/assets/; if `textured`, report/exports/SUITE/MODEL/*.obj, .mtl, .png, .glb. What has
-    not changed is not drawn again. `progress` hears how it goes.
+    pictures/; report/methods.bib; report/index.html, report/models/SUITE/MODEL.html and what they
+    share in report/assets/; if `textured`, report/exports/SUITE/MODEL/*.obj, .mtl, .png, .glb.
+    What has not changed is not drawn again. `progress` hears how it goes.
 
     Raises:
         InputError: the folder is missing, holds no results, or is of a newer version; something
@@ -43,6 +44,7 @@ def write(folder: Path, *, jobs: int, textured: bool = False, progress: Progress
         if textured:
             faults += exports.write(suite, report, progress)
         sections.append(Section(report, suite, made, drawn, faults, folder))
+    citing.write(report, suites)
     return page.write(report, str(folder), sections)
 
 

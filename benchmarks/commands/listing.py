@@ -131,7 +131,18 @@ def about(method: str) -> list[str]:
     return [
         found.summary,
         f"Needs: {needs}. The same map for the same seed: {found.deterministic}.",
+        *([f"Licence: {found.licence}."] if found.licence else []),
     ]
+
+
+def credit(method: str) -> tuple[str, tuple[str, ...]]:
+    """Licence and BibTeX entries of a method; nothing of one that is not known here."""
+    from baselines import registry
+
+    try:
+        return registry.credit(registry.RENAMED.get(method, method))
+    except (ImportError, InputError):
+        return "", ()
 
 
 def metrics() -> Table:

@@ -138,10 +138,12 @@ class Comparison:
 
     Attributes:
         before, after: the folders.
+        names: what the two are called; their paths unless something else is given.
     """
 
     before: Path
     after: Path
+    names: tuple[str, str] = ("", "")
 
     @cached_property
     def _suites(self) -> tuple[list[Contents], list[Contents]]:

@@ -77,7 +77,8 @@ def summary(found: Comparison) -> Table:
 
 def _notes(found: Comparison) -> Iterator[str]:
     """What the two folders are, and what holds for all tables."""
-    yield f"Before: {found.before}. After: {found.after}."
+    before, after = found.names if all(found.names) else (found.before, found.after)
+    yield f"Before: {before}. After: {after}."
     for name, (old, new) in found.machines.items():
         yield f"{name}: {old or 'none'} before, {new or 'none'} after."
     if not found.same_hardware:

@@ -12,6 +12,7 @@ from markupsafe import Markup
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
 
+from benchmarks.commands.listing import credit
 from benchmarks.metrics.grades import BOUNDS
 from benchmarks.rendering.maps import ANGLE_SCALE, AREA_SCALE
 from parapoint.files.targets import write_text
@@ -75,6 +76,7 @@ def index(folder: str, sections: Sequence[Section], links: Links = ()) -> str:
             sections=sections,
             folder=folder,
             links=links,
+            licence=lambda label: credit(label.method)[0],
             cells=_inline(board.data([section.contents for section in sections])),
             grouped=grouped,
             definition=definition,

@@ -16,6 +16,7 @@ from tempfile import TemporaryDirectory
 
 from benchmarks.store import merging
 from parapoint.errors import InputError
+from reports import citing
 from reports.contents import contents
 from reports.history.comparison import Comparison
 from reports.history.pages import said
@@ -69,8 +70,9 @@ def build(sources: Sequence[Path], out: Path, *, jobs: int, progress: Progress =
             faults = pictures.draw(suite, out / "figures" / name / "pictures", jobs, progress)
             results = Path("results") / suite.suite
             sections.append(Section(out, suite, made, (), faults, results))
+        citing.write(out, suites)
         links = methods.write(out, sections)
-        links += [("history", address) for address in _history(folders, out)]
+        links += [("history", address) for address in _history(sources, folders, out)]
         index = pages.write(out, "results", sections, links)
         cells = sum(len(suite.rows) for suite in suites)
     size = sum(path.stat().st_size for path in out.rglob("*") if path.is_file())
@@ -93,16 +95,17 @@ def _folders(sources: Sequence[Path]) -> Iterator[tuple[list[Path], Path]]:
         yield folders, joined
 
 
-def _history(folders: Sequence[Path], out: Path) -> list[str]:
-    """Write what moved between folders; the address of its page, if any cell is shared."""
+def _history(sources: Sequence[Path], folders: Sequence[Path], out: Path) -> list[str]:
+    """Write what moved between the sources; the address of its page, if any cell is shared."""
     made, leads = [], []
     for number, after in enumerate(folders):
-        for before in folders[:number][::-1]:
-            found = Comparison(before, after)
+        for earlier in range(number)[::-1]:
+            names = (sources[earlier].name, sources[number].name)
+            found = Comparison(folders[earlier], after, names)
             if not found.shared:
                 continue
             parts = [by_metric(found), summary(found), moved(found), ended(found), alone(found)]
-            title = f"{before.name} to {after.name}"
+            title = " to ".join(names)
             leads.append(f"{title}: {said(found)}")
             made += [
                 dataclasses.replace(

@@ -18,7 +18,7 @@ from reports.contents import (
     number,
 )
 from reports.means import common_cases, common_values, statistic
-from reports.ranking import TIMES
+from reports.ranking import TIMES, means_may_rank
 from reports.tables.notes import environment_note, failure_notes, legend, load_notes, method_notes
 from reports.tables.published import model
 from reports.tables.table import DONE, METHOD, Column, Table, Value, metric_column, short_columns
@@ -124,7 +124,11 @@ def means_by_kind(contents: Contents) -> Table:
             }
             for metric in names:
                 values = common_values(contents, label, metric, common)
-                row[metric] = statistic("mean", values, metric_column(metric).better)
+                column = metric_column(metric)
+                row[metric] = statistic("mean", values, column.better)
+                grades = [one["grade"] for case, one in found.items() if one and case in common]
+                fit = means_may_rank(grades, angles=column.angles)
+                row[f"grade {metric}"] = "" if fit else "broken"
             block.append(row)
         blocks.append(tuple(block))
     return Table(
@@ -133,7 +137,8 @@ def means_by_kind(contents: Contents) -> Table:
         caption=(
             "Means over the models on which every method gave a map that gives one anywhere on "
             "this kind of surface, so that nobody gains by failing. The last column counts those "
-            "on which the method gave a map."
+            "on which the method gave a map. Means over too many broken maps, or for other than "
+            "angles collapsed ones, take no part in best and second."
         ),
         columns=(
             Column("kind", "Surface", text=True, once=True),

@@ -249,3 +249,13 @@ def test_the_index_shows_every_model_under_every_method_with_grade_and_flips(tmp
     text = parsed(tmp_path / "report" / "index.html").text
     assert "Every model under every method" in text
     assert "paper" in text  # the preset is named
+
+
+def test_what_to_cite_is_one_file_with_each_entry_once(reported):
+    text = (reported / "report" / "methods.bib").read_text(encoding="utf-8")
+    assert text.count("@article{rabinovich2017,") == 1
+    assert text.count("@misc{zhang2024parapoint,") == 1
+    assert "tutte1963" not in text
+    index = (reported / "report" / "index.html").read_text(encoding="utf-8")
+    assert 'href="methods.bib"' in index
+    assert "Licence: MIT, on libigl (MPL-2.0)" in index

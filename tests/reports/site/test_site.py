@@ -70,6 +70,7 @@ def test_the_newest_cell_is_shown_and_the_history_says_what_moved(built):
     text = (place / "out" / "history" / "index.html").read_text(encoding="utf-8")
     assert "Of 2 cells in both, 1 moved beyond noise" in text
     assert "old to new: What moved, metric by metric" in text
+    assert "Before: old. After: new." in text
     table = (place / "out" / "history" / "1-metrics.csv").read_text()
     assert re.search(r'^"angle difference, mean",1.0,0.0,SLIM on b', table, re.MULTILINE)
     cells = (place / "out" / "tables" / "paper" / "cells.csv").read_text()

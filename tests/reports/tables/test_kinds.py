@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from reports.contents import contents
+from reports.contents import ANGLE, AREA, contents
 from reports.tables.kinds import means_by_kind, success
 
 from ..conftest import DEVIL, HAND, NEFERTITI, Writer, flat, seeded, sheet
@@ -53,3 +53,23 @@ def test_success_counts_usable_maps_alone_and_one_to_one_needs_every_seed(tmp_pa
     assert row[f"{name} usable"] == "1/4"
     assert row[f"{name} bijective"] == "2/4"
     assert row[f"{name} ok"] == "4/4"
+
+
+def test_means_over_broken_maps_are_never_best(tmp_path):
+    suite = seeded(tmp_path, cases=("a", "b"), seeds=(0,))
+    for grade, area_marks, angle_marks in (
+        ("usable", True, True),
+        ("collapsed", False, True),
+        ("broken", False, False),
+    ):
+        for record in suite.records.values():
+            record["grade"] = "usable"
+            record[ANGLE], record[AREA] = 2.0, 1.0
+        for case in ("a", "b"):
+            suite.records[case, "LSCM"] |= {"grade": grade, ANGLE: 0.1, AREA: 0.1}
+        table = means_by_kind(suite)
+        (block,) = table.cells
+        keys = [column.key for column in table.columns]
+        row = next(row for row in block if row[keys.index("method")].text == "LSCM")
+        assert (row[keys.index(AREA)].mark == "best") == area_marks
+        assert (row[keys.index(ANGLE)].mark == "best") == angle_marks
