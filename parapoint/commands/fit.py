@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,8 @@ from parapoint import saving
 from parapoint.commands.fitting import estimator_of, fitted, summary
 from parapoint.commands.memory import memory_option
 from parapoint.files.reading import read_surface
+
+logger = logging.getLogger("parapoint")
 
 
 @click.command(no_args_is_help=True, options_metavar="[OPTIONS] --out DIR")
@@ -49,7 +52,18 @@ def fit(surface: str, out: str, preset: str, as_json: bool, **settings: Any) -> 
     for stem in ("model", "checkpoint"):
         saving.check_free(Path(out), stem)
     given = read_surface(surface)
-    model = fitted(surface, given, model, checkpoint=out)
+    try:
+        model = fitted(surface, given, model, checkpoint=out)
+    except KeyboardInterrupt:
+        logger.warning("%s", _how_to_go_on(out))
+        raise
     model.save(out)
     report = {"model": out, "estimator": type(model).__name__, **model.report_}
     print(json.dumps(report) if as_json else f"{out}: {summary(model)}")
+
+
+def _how_to_go_on(out: str) -> str:
+    """What to do after a fit that was broken off."""
+    if any(Path(out).rglob("checkpoint.json")):
+        return f"{out}: keeps the training of up to a minute ago; the same command goes on from it"
+    return f"{out}: nothing is saved yet; --time-budget SECONDS lets a fit end early with a map"

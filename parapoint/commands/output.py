@@ -21,6 +21,7 @@ from parapoint.textures.baking import MARGIN, baked
 from parapoint.textures.checkerboard import checkerboard
 from parapoint.textures.placing import BORDER, Placing
 from parapoint.textures.preview import write_preview
+from parapoint.unwrapping.quality import quality
 
 logger = logging.getLogger("parapoint")
 
@@ -121,7 +122,7 @@ def write(
         write_textured(out, shown, pixels)
     if preview is not None:
         write_preview(preview, shown, pixels)
-    return facts
+    return {"faces": len(shown.mesh.faces)} | facts | quality(shown, size).facts()
 
 
 def _warn_of_far(out: str, is_far: BoolArray) -> None:

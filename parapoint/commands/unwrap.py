@@ -7,9 +7,10 @@ from typing import Any
 
 import click
 
-from parapoint.commands.fitting import estimator_of, fitted, summary
+from parapoint.commands.fitting import estimator_of, fitted
 from parapoint.commands.memory import memory_option
 from parapoint.commands.output import TEXTURE, preview_target, target, write
+from parapoint.commands.telling import lines
 from parapoint.errors import InputError
 from parapoint.files.reading import Polygons, read_polygons
 from parapoint.parameters import check_choice
@@ -88,7 +89,7 @@ def unwrap(
     border = BORDER if margin is None else margin / (texture or TEXTURE)
     if isinstance(given, Polygons):
         from parapoint.commands.mesh_output import mesh_output
-        from parapoint.commands.unwrapping import Request, lines, unwrap_mesh
+        from parapoint.commands.unwrapping import Request, unwrap_mesh
         from parapoint.unwrapping.unwrap import Unwrap
 
         check_choice("components", settings["components"], COMPONENTS)
@@ -134,4 +135,5 @@ def unwrap(
     model = fitted(surface, given, estimator_of("computed", settings))
     written = components(given)[0] if model.components == "largest" else given
     facts = write(model, written, out, texture=texture, margin=margin, preview=picture)
-    print(json.dumps({**facts, **model.report_}) if as_json else f"{out}: {summary(model)}")
+    facts |= model.report_
+    print(json.dumps(facts) if as_json else lines(facts))

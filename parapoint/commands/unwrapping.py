@@ -12,7 +12,9 @@ import click
 import numpy as np
 
 from parapoint.commands.mesh_output import MeshOutput
+from parapoint.commands.progress import bar
 from parapoint.errors import InputError
+from parapoint.fitting import Progress
 from parapoint.method import UnsupportedError
 from parapoint.planar.domains import FlatteningError
 from parapoint.surfaces.areas import MOST_STARVED
@@ -54,20 +56,21 @@ def unwrap_mesh(mesh: Mesh, request: Request, output: MeshOutput) -> dict[str, o
         click.ClickException: no map without flips was found.
     """
     began = time.perf_counter()
-    try:
-        if request.seams is None:
-            made = request.method.unwrapped(mesh, seed=request.seed)
-        else:
-            edges = read_seams(request.seams, mesh)
-            seconds = request.method.time_budget
-            deadline = math.inf if seconds is None else time.monotonic() + seconds
-            made = unwrapped_along(mesh, edges, deadline)
-    except (UnsupportedError, InputError) as error:
-        raise InputError(f"{output.source}: {error}") from None
-    except FlatteningError as error:
-        raise click.ClickException(f"{output.source}: {error}") from error
-    placed = packed(Charted(mesh, made), request.border)
-    found = quality(placed, output.texture)
+    with bar() as advance:
+        seconds = request.method.time_budget
+        at_most = "" if seconds is None else f" (at most {seconds:g} s)"
+        advance(Progress(f"unwrapping{at_most}"))
+        made = _made(mesh, request, output)
+        advance(Progress("packing"))
+        placed = packed(Charted(mesh, made), request.border)
+        advance(Progress("baking"))
+        picture = output.picture(placed)
+        advance(Progress("writing"))
+        written = output.write(placed, picture)
+        if request.preview is not None:
+            write_preview(request.preview, placed, picture[..., :3])
+        advance(Progress("measuring"))
+        found = quality(placed, output.texture)
     facts: dict[str, object] = {"file": str(output.out), "faces": len(mesh.faces), **found.facts()}
     parts = [part for part in _parts(made) if "end_energy" in part]
     facts["overlap"] = "none" if all(part["bijective"] for part in parts) else "some"
@@ -75,13 +78,29 @@ def unwrap_mesh(mesh: Mesh, request: Request, output: MeshOutput) -> dict[str, o
         facts["overlap"] = "unknown"  # a face that was turned or left out may lie on another
     facts["energy"] = round(max(float(str(part["end_energy"])) for part in parts), 4)
     facts["components"] = mesh.component_count
-    picture = output.picture(placed)
-    facts |= output.write(placed, picture)
-    if request.preview is not None:
-        write_preview(request.preview, placed, picture[..., :3])
+    facts |= written
     facts["seconds"] = round(time.perf_counter() - began, 1)
     _warn(found, facts, request, output)
     return facts
+
+
+def _made(mesh: Mesh, request: Request, output: MeshOutput) -> Parameterization:
+    """The map of a mesh, as it was asked for.
+
+    Raises:
+        InputError, click.ClickException: see `unwrap_mesh`.
+    """
+    try:
+        if request.seams is None:
+            return request.method.unwrapped(mesh, seed=request.seed)
+        edges = read_seams(request.seams, mesh)
+        seconds = request.method.time_budget
+        deadline = math.inf if seconds is None else time.monotonic() + seconds
+        return unwrapped_along(mesh, edges, deadline)
+    except (UnsupportedError, InputError) as error:
+        raise InputError(f"{output.source}: {error}") from None
+    except FlatteningError as error:
+        raise click.ClickException(f"{output.source}: {error}") from error
 
 
 def read_seams(path: str, mesh: Mesh) -> IntArray:
@@ -106,25 +125,6 @@ def read_seams(path: str, mesh: Mesh) -> IntArray:
     if not found:
         raise InputError(f"{path}: has no edge")
     return np.array(found, dtype=np.int64)
-
-
-def lines(facts: dict[str, object]) -> str:
-    """The facts in a few lines for a reader."""
-    of = {name: str(value) for name, value in facts.items()}
-    angles = f"angles off by {of['angle_mean']}° in the mean, {of['angle_worst']}° at worst"
-    stretch = f"stretch {of['stretch_mean']} in the mean, {of['stretch_worst']} at worst"
-    part = f"smallest part at {of['smallest_part']} of its fair area"
-    charts = "1 chart" if of["charts"] == "1" else f"{of['charts']} charts"
-    seam = f"{charts}, seam {of['seam']} of the square root of the area"
-    texels = f"{of['texels_per_unit']} texels per unit, {of['filled']} of the square filled"
-    return "\n".join(
-        [
-            f"{of['file']}: {of['faces']} faces in {of['seconds']} s",
-            f"{angles}; {stretch}",
-            f"{part}; {of['flipped']} flipped faces, overlap: {of['overlap']}",
-            f"{seam}; {texels}",
-        ]
-    )
 
 
 def _parts(made: Parameterization) -> list[dict[str, object]]:

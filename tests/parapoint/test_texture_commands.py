@@ -70,6 +70,34 @@ def test_a_scan_becomes_a_textured_model_in_one_command(scan, tmp_path, capsys) 
     assert (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]).min() > 0
 
 
+def test_the_last_lines_of_a_cloud_say_how_good_its_map_is(scan, tmp_path, capsys) -> None:
+    target = tmp_path / "scan.glb"
+    status, out, _ = run(["unwrap", scan, "--out", target, "--texture", 64], capsys)
+    assert status == 0
+    first, angles, part, seam = out.splitlines()
+    assert first.startswith(f"{target}: ")
+    assert "faces in" in first
+    assert "° at worst; stretch" in angles
+    assert part.endswith("; 0 flipped faces")
+    assert seam.startswith("1 chart, seam 0")
+    assert "texels per unit" in seam
+
+
+@pytest.mark.parametrize("saved", [True, False])
+def test_a_fit_that_is_broken_off_says_how_to_go_on(saved, scan, tmp_path, capsys, caplog) -> None:
+    def broken_off(*_, **__):
+        if saved:
+            (tmp_path / "model" / "component-0").mkdir(parents=True)
+            (tmp_path / "model" / "component-0" / "checkpoint.json").touch()
+        raise KeyboardInterrupt
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("parapoint.commands.fit.fitted", broken_off)
+        status, _, err = run(["fit", scan, "--out", tmp_path / "model"], capsys)
+    assert (status, err) == (130, "\ninterrupted\n")
+    assert ("the same command goes on" if saved else "--time-budget SECONDS") in caplog.text
+
+
 @pytest.mark.parametrize("ending", [".obj", ".ply"])
 def test_the_texture_shows_each_point_in_its_colour(ending, model, bowl, tmp_path) -> None:
     target = tmp_path / f"a{ending}"

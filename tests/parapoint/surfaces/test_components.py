@@ -114,3 +114,12 @@ def test_normals_stay_with_their_points() -> None:
     for part in components(PointCloud(points, -points)):
         assert part.normals is not None
         np.testing.assert_array_equal(part.normals, -part.points)
+
+
+def test_points_of_a_component_keep_what_is_known_of_them() -> None:
+    points = spheres(300, 2000)
+    colours = np.repeat(np.array([[9, 0, 0], [0, 7, 0]], dtype=np.uint8), [300, 2000], axis=0)
+    largest = components(PointCloud(points, points, attributes={"colours": colours}))[0]
+    assert len(largest.points) == 2000
+    assert (largest.attributes["colours"] == [0, 7, 0]).all()
+    assert np.array_equal(largest.normals, largest.points)
