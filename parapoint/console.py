@@ -9,11 +9,14 @@ from __future__ import annotations
 import hashlib
 import importlib
 import sys
-from typing import Any, Never
+from typing import TYPE_CHECKING, Any, Never
 
 import click
 
 from parapoint.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 LONGEST_MESSAGE = 2000
 """Characters of a message that are printed."""
@@ -56,6 +59,17 @@ class LazyGroup(click.Group):
             module, _, attribute = self._places[name].partition(":")
             command = getattr(importlib.import_module(module), attribute)
         return name, command, rest
+
+
+def terminal(*, stderr: bool = False) -> Console:
+    """The console of rich on standard output or error: drawn on if it is a terminal, plain if not.
+
+    Rich alone would draw bars into a notebook's pipe, as Jupyter sets FORCE_COLOR.
+    """
+    from rich.console import Console
+
+    stream = sys.stderr if stderr else sys.stdout
+    return Console(stderr=stderr, force_terminal=stream.isatty())
 
 
 def printable(text: str, longest: int = LONGEST_NAME) -> str:

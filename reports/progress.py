@@ -7,7 +7,6 @@ import time
 from collections.abc import Iterable, Iterator
 from typing import TypeVar
 
-from rich.console import Console
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -16,6 +15,8 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 from rich.progress import Progress as Bar
+
+from parapoint.console import terminal
 
 Item = TypeVar("Item")
 SILENCE = 60.0
@@ -49,7 +50,7 @@ class Shown(Progress):
         if not total:
             yield from items
             return
-        console = Console(stderr=True)
+        console = terminal(stderr=True)
         if not console.is_terminal:
             yield from _lines(items, what, total)
             return

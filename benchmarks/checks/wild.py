@@ -8,7 +8,6 @@ prints for each family how many files were read, refused and wrong. It exits wit
 from __future__ import annotations
 
 import base64
-import io
 import json
 import logging
 import struct
@@ -20,41 +19,20 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import click
-import laspy
 import numpy as np
 
 from baselines import registry
+from benchmarks.checks import wild_clouds
+from benchmarks.checks.wild_case import POINTS, SEED, Case, cannot_be_told, shows
 from benchmarks.metrics.evaluation import evaluate
 from parapoint import console
 from parapoint.commands.mesh_output import mesh_output
 from parapoint.commands.unwrapping import Request, unwrap_mesh
-from parapoint.computed.computed_map import ComputedMap
 from parapoint.errors import InputError
-from parapoint.files.reading import Polygons, read_parameterized, read_polygons, read_surface
-from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, PointCloud, unit_normals
+from parapoint.files.reading import Polygons, read_parameterized, read_polygons
+from parapoint.surfaces.surface import FloatArray, IntArray, unit_normals
 from parapoint.textures.placing import BORDER
 from parapoint.unwrapping.unwrap import Unwrap
-
-POINTS = np.array([[1.5, 2.25, -3], [4, 5.5, 6], [7, 8.25, 9]])
-"""(3, 3) the points that most files hold."""
-SEED = 0
-"""The seed of every random draw."""
-
-
-class Case(NamedTuple):
-    """One file.
-
-    Attributes:
-        name: its name.
-        data: its bytes.
-        is_right: tells whether what is read from a path is what the file means.
-        may_refuse: whether the file may be refused as well.
-    """
-
-    name: str
-    data: bytes
-    is_right: Callable[[Path], bool]
-    may_refuse: bool = False
 
 
 class Tally(NamedTuple):
@@ -82,23 +60,6 @@ def tally(cases: list[Case], folder: Path) -> Tally:
     return Tally(read, refused, wrong)
 
 
-def _shows(expected: FloatArray) -> Callable[[Path], bool]:
-    """Whether the points or vertices are these (N, 3)."""
-
-    def is_right(path: Path) -> bool:
-        surface = read_surface(path)
-        found = surface.vertices if isinstance(surface, Mesh) else surface.points
-        return found.shape == expected.shape and np.allclose(found, expected)
-
-    return is_right
-
-
-def _cannot_be_told(path: Path) -> bool:
-    """Read a file that must be refused."""
-    read_surface(path)
-    return False
-
-
 def commas() -> Iterator[Case]:
     """Decimal commas, with each kind of separator between the numbers."""
     text = ["\n".join(" ".join(f"{x:g}" for x in row) for row in POINTS)]
@@ -115,8 +76,8 @@ def commas() -> Iterator[Case]:
         "csv": text[0].replace(" ", ","),
     }
     for name, lines in variants.items():
-        yield Case(f"{name}.xyz", lines.encode(), _shows(POINTS))
-    yield Case("untold.xyz", b"1,5,2,5,3,5\n" * 3, _cannot_be_told, may_refuse=True)
+        yield Case(f"{name}.xyz", lines.encode(), shows(POINTS))
+    yield Case("untold.xyz", b"1,5,2,5,3,5\n" * 3, cannot_be_told, may_refuse=True)
 
 
 def marks() -> Iterator[Case]:
@@ -131,7 +92,7 @@ def marks() -> Iterator[Case]:
     xyz = "".join(f"{x} {y} {z}\n" for x, y, z in triangle)
     for ending, text in {".obj": obj, ".off": off, ".ply": ply, ".xyz": xyz, ".pts": xyz}.items():
         for encoding in ("utf-8-sig", "utf-16", "utf-32"):
-            yield Case(f"{encoding}{ending}", text.encode(encoding), _shows(triangle))
+            yield Case(f"{encoding}{ending}", text.encode(encoding), shows(triangle))
 
 
 def polygons() -> Iterator[Case]:
@@ -261,7 +222,44 @@ def gltf() -> Iterator[Case]:
         yield Case(f"{name}.gltf", data, partial(_faces_up, faces=faces, area=area))
     for name in ("KHR_draco_mesh_compression", "EXT_meshopt_compression"):
         data = _gltf(*given, extensionsRequired=[name])
-        yield Case(f"{name}.gltf", data, _cannot_be_told, may_refuse=True)
+        yield Case(f"{name}.gltf", data, cannot_be_told, may_refuse=True)
+
+
+def writers() -> Iterator[Case]:
+    """A square, as modellers, CAD programs, scanners and surveyors write it."""
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    lines = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+    for number, text in enumerate(
+        (
+            lines + "f -4 -3 -2 -1\n",
+            lines.replace("\n", " 1.0\n") + "f 1 2 3 4\n",
+            lines.replace("\n", " 0.1 0.2 0.3\n") + "f 1 2 3 4\n",
+            lines.replace("\n", " # c\n") + "f 1 2 \\\n3 \\\n 4 # quad\n",
+            (lines + "f 1 2 3 4").replace("\n", "\r\n").replace(" ", "\t"),
+            (lines + "f 1 2 3 4").replace("\n", "\r"),
+            lines + "vn 0 0 1\nl 1 2\np 1 2\nf 1//1 2//1 3//1 4//1\n",
+        )
+    ):
+        yield Case(f"writer_{number}.obj", text.encode(), shows(square))
+    for line in ("surf 0 1 0 1 1 2 3 4", "curv 0 1 1 2 3 4"):
+        data = f"{lines}cstype bspline\n{line}\nend\n".encode()
+        yield Case(f"{line[:4]}.obj", data, cannot_be_told, may_refuse=True)
+    for order, kind in (("<", "little"), (">", "big")):
+        for index, code in (("uchar", "B"), ("ushort", "H"), ("int", "i"), ("int64", "q")):
+            header = (
+                f"ply\nformat binary_{kind}_endian 1.0\ncomment end_header comes later\n"
+                "element vertex 4\nproperty double z\nproperty uchar red\nproperty float x\n"
+                f"property float y\nelement face 1\nproperty list uint {index} vertex_index\n"
+                "end_header\n"
+            )
+            body = b"".join(struct.pack(order + "dBff", z, 7, x, y) for x, y, z in square)
+            body += struct.pack(f"{order}I4{code}", 4, 0, 1, 2, 3)
+            yield Case(f"{kind}_{index}.ply", header.encode() + body, shows(square))
+    for number, heading in enumerate(
+        ("//X Y Z Scalar_1", "X [m] Y [m] Z [m] I", "x y z i\nm m m 1/1", "Easting North Height C2")
+    ):
+        text = heading + "\n" + "".join("{} {} {} 0.5\n".format(*row) for row in POINTS)
+        yield Case(f"heading_{number}.xyz", text.encode(), shows(POINTS))
 
 
 def _faces_up(path: Path, faces: int, area: float) -> bool:
@@ -297,117 +295,17 @@ def _is_written(path: Path, ending: str, faces: int, area: float) -> bool:
     return turned == 0 and _faces_up(out, faces, area)
 
 
-def _dome(count: int = 400) -> FloatArray:
-    points = np.random.default_rng(SEED).normal(size=(count, 3))
-    points /= np.linalg.norm(points, axis=1, keepdims=True)
-    points[:, 2] = np.abs(points[:, 2])
-    return points
-
-
-def strays() -> Iterator[Case]:
-    """Clouds whose last rows are flying pixels or stand for missing data."""
-    rng = np.random.default_rng(SEED)
-    far = rng.normal(size=(12, 3))
-    far /= np.linalg.norm(far, axis=1, keepdims=True)
-    away = np.array([5e5, 5e6, 100.0])
-    for name, points, rows in (
-        ("one_30", _dome(), 30 * far[:1]),
-        ("some_500", _dome(), 500 * far),
-        ("some_million", _dome(), 1e6 * far),
-        ("zeros", _dome() + away, np.zeros((20, 3))),
-        ("nodata", _dome(), np.full((20, 3), -9999.0)),
-        ("clump_30", _dome(), 0.1 * far + [30, 0, 0]),
-        ("clumps_30", _dome(), np.concatenate([0.1 * far + 30 * axis for axis in np.eye(3)])),
-        ("none", _dome(), np.zeros((0, 3))),
-    ):
-        data = _text(np.concatenate([points, rows]))
-        yield Case(f"{name}.xyz", data, partial(_has_strays, count=len(rows)))
-
-
-def _text(points: FloatArray) -> bytes:
-    return "".join("{} {} {}\n".format(*row) for row in points.tolist()).encode()
-
-
-def _has_strays(path: Path, count: int) -> bool:
-    """Whether this many rows are left out, and all others are on the surface that is found."""
-    report = ComputedMap().fit(read_surface(path)).report_
-    return report["strays"] == count and report["missed"] == 0
-
-
-def scan_lines() -> Iterator[Case]:
-    """Scan lines much farther apart than the points on them; beyond 1:30 they may be refused."""
-    for gap in (1, 8, 12, 20, 30, 100):
-        x, y = np.meshgrid(np.arange(120.0), gap * np.arange(8.0))
-        x += np.random.default_rng(SEED).uniform(0, 1, (8, 1))
-        points = np.stack([x, y, 5 * np.sin(x / 30)], axis=2).reshape(-1, 3)
-        yield Case(
-            f"lines_{gap}.xyz",
-            _text(points),
-            partial(_has_strays, count=0),
-            may_refuse=gap > 30,
-        )
-
-
-def pcd() -> Iterator[Case]:
-    """Padding, types, and heads without POINTS, as the drivers of lidars write them."""
-    for name, fields, sizes, types, counts, kind in (
-        ("plain", "x y z", "4 4 4", "F F F", "1 1 1", "<3f"),
-        ("doubles", "x y z", "8 8 8", "F F F", "1 1 1", "<3d"),
-        ("turned", "z y x", "4 4 4", "F F F", "1 1 1", "<3f"),
-        ("count0", "x y z _", "4 4 4 1", "F F F U", "1 1 1 0", "<3f"),
-        ("padded", "x y z _", "4 4 4 1", "F F F U", "1 1 1 5", "<3f5x"),
-        ("ring", "x y z ring", "4 4 4 2", "F F F U", "1 1 1 1", "<3f2x"),
-    ):
-        rows = POINTS[:, ::-1] if name == "turned" else POINTS
-        head = f"VERSION .7\nFIELDS {fields}\nSIZE {sizes}\nTYPE {types}\nCOUNT {counts}\n"
-        for ends, size in (("points", "WIDTH 3\nHEIGHT 1\nPOINTS 3\n"), ("width", "WIDTH 3\n")):
-            data = (head + size + "DATA binary\n").encode()
-            data += b"".join(struct.pack(kind, *row) for row in rows.tolist())
-            yield Case(f"{name}_{ends}.pcd", data, _shows(POINTS))
-
-
-def las() -> Iterator[Case]:
-    """Noise and withheld points, which are left out, and colours of 8 and 16 bits."""
-    colours = np.array([[0, 128, 255], [9, 10, 11], [255, 0, 0], [1, 2, 3], [7, 8, 9]])
-    points = np.concatenate([POINTS, [[1e6, 0, 0], [-1e6, 0, 0]]])
-    for name, classes, withheld, kept in (
-        ("whole", [0, 1, 2, 3, 6], [0] * 5, [0, 1, 2, 3, 4]),
-        ("low_noise", [2, 2, 2, 7, 7], [0] * 5, [0, 1, 2]),
-        ("high_noise", [2, 2, 2, 18, 18], [0] * 5, [0, 1, 2]),
-        ("withheld", [2] * 5, [0, 0, 0, 1, 1], [0, 1, 2]),
-        ("noise_and_withheld", [2, 7, 2, 18, 2], [0, 0, 0, 0, 1], [0, 2]),
-    ):
-        for bits, ending in ((8, ".las"), (16, ".las"), (8, ".laz"), (16, ".laz")):
-            values = colours * (257 if bits == 16 else 1)
-            cloud = laspy.LasData(laspy.LasHeader(point_format=7, version="1.4"))
-            cloud.x, cloud.y, cloud.z = points.T
-            cloud.classification, cloud.withheld = np.array(classes), np.array(withheld)
-            cloud.red, cloud.green, cloud.blue = values.astype(np.uint16).T
-            file = io.BytesIO()
-            cloud.write(file, do_compress=ending == ".laz")
-            is_right = partial(_has_colours, points=points[kept], colours=values[kept], bits=bits)
-            yield Case(f"{name}_{bits}{ending}", file.getvalue(), is_right)
-
-
-def _has_colours(path: Path, points: FloatArray, colours: IntArray, bits: int) -> bool:
-    """Whether these points (N, 3) are read with these colours (N, 3), of this many bits."""
-    surface = read_surface(path)
-    assert isinstance(surface, PointCloud)
-    found = surface.attributes["colours"]
-    is_there = surface.points.shape == points.shape and np.allclose(surface.points, points)
-    return is_there and found.dtype.itemsize * 8 == bits and np.array_equal(found, colours)
-
-
 FAMILIES: dict[str, Callable[[], Iterator[Case]]] = {
     "split vertices": split_vertices,
-    "strays": strays,
+    "strays": wild_clouds.strays,
     "polygons": polygons,
     "glTF": gltf,
+    "writers": writers,
     "commas": commas,
     "marks": marks,
-    "scan lines": scan_lines,
-    "PCD": pcd,
-    "LAS": las,
+    "scan lines": wild_clouds.scan_lines,
+    "PCD": wild_clouds.pcd,
+    "LAS": wild_clouds.las,
     "written": written,
 }
 """What makes the files of each family."""

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from rich.console import Console, RenderableType
+from rich.console import RenderableType
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
@@ -23,7 +23,7 @@ from benchmarks.metrics.table import METRICS
 from benchmarks.running.expectation import about, cell_seconds, clock, remaining
 from benchmarks.running.planning import Cell
 from benchmarks.running.runner import Progress, Summary
-from parapoint.console import LONGEST_MESSAGE, printable
+from parapoint.console import LONGEST_MESSAGE, printable, terminal
 
 if TYPE_CHECKING:
     from benchmarks.store.rows import ResultRow
@@ -54,7 +54,7 @@ class Display(Progress):
 
     def __init__(self) -> None:
         """A display that shows nothing until it is entered."""
-        console = Console(stderr=True)
+        console = terminal(stderr=True)
         self._bar = Bar(
             TextColumn("{task.description}", table_column=Column(ratio=1, no_wrap=True)),
             BarColumn(bar_width=16),
@@ -229,7 +229,7 @@ def print_table(table: Table, drawn: Callable[[Table], RenderableType] | None = 
         table: the table.
         drawn: makes of it what a terminal shows; the table itself if None.
     """
-    console = Console()
+    console = terminal()
     if console.is_terminal:
         console.print(table if drawn is None else drawn(table))
         return

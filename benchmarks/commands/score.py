@@ -18,6 +18,7 @@ from benchmarks.metrics.metric import GROUPS, WITHOUT_SPANNING
 from benchmarks.metrics.state import MapState
 from benchmarks.metrics.table import METRICS
 from parapoint.commands.memory import memory_option
+from parapoint.console import terminal
 from parapoint.errors import InputError
 from parapoint.files.reading import faults_of, has_faces, read_parameterized, read_point_map
 from parapoint.files.targets import checked_picture
@@ -72,9 +73,9 @@ def score(file: Path, *, reference: Path | None, as_json: bool, heatmap: Path | 
     if as_json:
         print(json.dumps({"grade": found, **json_values(values)}, allow_nan=False))
         return
-    console = Console()
+    console = terminal()
     if not console.is_terminal:
-        console = Console(width=WIDTH)
+        console = Console(width=WIDTH, force_terminal=False)
     console.print(Text(title, style="bold"))
     console.print(Text(f"grade: {found} ({BOUNDS})"))
     for table in tables(values):

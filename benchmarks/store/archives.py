@@ -130,6 +130,8 @@ def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
         InputError: the file is missing or damaged, decodes to more than it may, or has a seal that
             does not fit.
     """
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: damaged (no file, but a folder, a pipe or a device)")
     try:
         # We open the file ourselves, since numpy leaves one open that is not an archive.
         with path.open("rb") as stream:

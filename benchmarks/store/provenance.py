@@ -22,6 +22,8 @@ def environment(folder: Path) -> dict[str, Any]:
         InputError: the file is damaged, or was written by a newer version.
     """
     path = folder / "environment.json"
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: damaged (no file, but a folder, a pipe or a device)")
     try:
         content = json.loads(path.read_bytes())
     except FileNotFoundError:

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from rich.console import Console
 from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
 
+from parapoint.console import terminal
 from parapoint.fitting import Progress
 
 
 @contextmanager
 def bar() -> Iterator[Callable[[Progress], None]]:
     """Gives the callback that moves the bar."""
-    terminal = Console(stderr=True)
+    shown = terminal(stderr=True)
     columns = (
         TextColumn("{task.description}"),
         BarColumn(bar_width=20),
@@ -23,7 +23,7 @@ def bar() -> Iterator[Callable[[Progress], None]]:
         TextColumn("{task.fields[loss]}"),
         TextColumn("{task.fields[remaining]}"),
     )
-    with Bar(*columns, console=terminal, disable=not terminal.is_terminal) as progress:
+    with Bar(*columns, console=shown, disable=not shown.is_terminal) as progress:
         # While nobody can tell the end, as while a map is computed, the bar pulses.
         task = progress.add_task("start", total=None, loss="", remaining="")
 

@@ -112,7 +112,6 @@ def flattened(
 
     Raises:
         ReconstructionError: the points show no surface that can be followed and flattened.
-        InputError: the points lie on lines too far apart.
     """
     lines = thinned(points)
     rows = np.arange(len(points)) if lines is None else lines.rows

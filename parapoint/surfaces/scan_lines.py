@@ -15,7 +15,6 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from parapoint.errors import InputError
 from parapoint.surfaces.surface import FloatArray, IntArray
 
 NEAREST = 6
@@ -40,9 +39,6 @@ STILL = 0.98
 """Lines are thinned again, as the next line is seen better each time, until so many points stay."""
 OFF = 0.7
 """Largest cosine with the direction of a line at which a neighbour is on another one."""
-LONELY_LINES = 0.5
-"""Largest share of the points that may see no line beside their own. Beyond it the lines are too
-far apart to show a surface."""
 BATCH = 4_096
 """Points looked at together, which bounds the memory."""
 
@@ -99,11 +95,6 @@ def thinned(points: FloatArray) -> Lines | None:
     count = breadth(points)
     if count is None:
         return None
-    if (count == 0).mean() > LONELY_LINES:
-        raise InputError(
-            "the points lie on lines that are more than 50 times as far apart as the points on "
-            "them; keep every tenth point of each line, or scan more lines"
-        )
     gap = _gaps(points, count)
     rows = np.arange(len(points))
     while True:

@@ -44,6 +44,15 @@ def test_a_bug_is_not_dressed_up_as_bad_input():
         console.run(command, [])
 
 
+@pytest.mark.parametrize("stderr", [False, True])
+def test_what_is_no_terminal_gets_neither_colours_nor_bars(stderr, monkeypatch, capsys):
+    monkeypatch.setenv("FORCE_COLOR", "1")  # as Jupyter sets it
+    shown = console.terminal(stderr=stderr)
+    assert not shown.is_terminal
+    shown.print("[bold red]plain")
+    assert "".join(capsys.readouterr()) == "plain\n"
+
+
 def test_a_package_that_is_not_installed_is_one_line(capsys):
     @click.command
     def command():

@@ -63,7 +63,7 @@ def test_without_a_terminal_each_end_is_a_line_and_a_minute_never_silent(clock, 
 
 def test_on_a_terminal_the_bar_fits_80_columns_with_count_and_times(clock, monkeypatch, capsys):
     terminal = Console(file=io.StringIO(), force_terminal=True, width=80, color_system=None)
-    monkeypatch.setattr(display, "Console", lambda **_: terminal)
+    monkeypatch.setattr(display, "terminal", lambda **_: terminal)
     (cell,) = cells("a case with a name that goes on and on and on, far beyond any window")
     shown = Display()
     shown.planned(Summary(SUITES["paper"], [cell.method], [cell]))

@@ -1,5 +1,6 @@
 """Caches in a results folder carry their hash: a changed one is told apart and made anew."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -79,3 +80,12 @@ def test_metrics_of_a_damaged_file_are_tried_again(tmp_path: Path) -> None:
     assert measuring.metrics(store)["angle_difference_mean"].isna().all()
     path.write_bytes(whole)
     assert measuring.metrics(store)["angle_difference_mean"].tolist() == expected
+
+
+@pytest.mark.parametrize("name", ["environment.json", "uv/a.npz"])
+def test_a_pipe_in_place_of_a_file_is_refused_and_not_waited_for(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    path.parent.mkdir(exist_ok=True)
+    os.mkfifo(path)
+    with pytest.raises(InputError, match="a pipe"):
+        read_arrays(path) if path.suffix == ".npz" else Store(tmp_path).environment()

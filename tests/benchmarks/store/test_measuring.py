@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from benchmarks import frame
 from benchmarks.store import measuring, verifying
 from benchmarks.store.results import Store
 from parapoint.errors import InputError
@@ -139,3 +140,18 @@ def test_a_map_of_another_kind_of_surface_is_bad_input_and_has_no_metrics(store,
     add(store, image)
     assert measuring.metrics(store)["symmetric_dirichlet"].isna().all()
     assert "square, flat: no metrics" in caplog.text
+
+
+def test_one_call_gives_everything_known_of_the_cells(store, tmp_path):
+    add(store)
+    add(store, status="failed", seed=1)
+    table = frame(store.folder)
+    assert table["status"].tolist() == ["ok", "failed"]
+    assert table["grade"].isna().tolist() == [False, True]
+    assert table["grade"].tolist()[0] == "usable"
+    assert table["seconds"].isna().all()
+    assert table["reason"].tolist() == ["", ""]
+    assert table["symmetric_dirichlet"].tolist()[0] == pytest.approx(4)
+    with pytest.raises(InputError, match="is no results folder"):
+        frame(tmp_path / "nothing")
+    assert not (tmp_path / "nothing").exists()
