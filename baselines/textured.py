@@ -23,6 +23,8 @@ from parapoint.textures.texels import texels
 HELD_OUT = 0.2
 """Share of the points that no texture is baked from, and that test it."""
 
+LEAST_ERROR = 1e-10
+"""Mean squared error of colours from 0 to 1 that counts as none: 100 dB."""
 STREAM = 20240317
 """Any number; it keeps the draw of the points held out apart from all others."""
 
@@ -78,7 +80,7 @@ class Textured:
         wrong = read - unit_colours(colours[~is_seen])
         uv, _ = carried(surface.points, charted.mesh, charted.map)
         report: dict[str, object] = {
-            "bake_psnr": -10 * float(np.log10((wrong**2).mean())),
+            "bake_psnr": -10 * float(np.log10(max((wrong**2).mean(), LEAST_ERROR))),
             "bake_cpu_seconds": seconds,
             "held_out": int((~is_seen).sum()),
             "charts": int(charted.map.charts().max()) + 1,

@@ -28,6 +28,9 @@ from parapoint.unwrapping.unwrap import Unwrap
 
 logger = logging.getLogger("parapoint")
 
+Y_UP = (".obj", ".glb", ".gltf")
+"""Endings of files in which y is upwards by rule or by custom; in others it is z."""
+
 
 @dataclass(frozen=True)
 class Request:
@@ -68,7 +71,8 @@ def unwrap_mesh(mesh: Mesh, request: Request, output: MeshOutput) -> dict[str, o
         advance(Progress("writing"))
         written = output.write(placed, picture)
         if request.preview is not None:
-            write_preview(request.preview, placed, picture[..., :3])
+            is_y_up = output.source.suffix.lower() in Y_UP
+            write_preview(request.preview, placed, picture[..., :3], is_y_up=is_y_up)
         advance(Progress("measuring"))
         found = quality(placed, output.texture)
     facts: dict[str, object] = {"file": str(output.out), "faces": len(mesh.faces), **found.facts()}

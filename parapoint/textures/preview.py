@@ -28,22 +28,23 @@ PAPER = 255
 Picture = npt.NDArray[np.uint8]
 
 
-def write_preview(path: Path, charted: Charted, texture: Picture) -> None:
+def write_preview(path: Path, charted: Charted, texture: Picture, *, is_y_up: bool = False) -> None:
     """Write the picture as PNG; see `preview`.
 
     Raises:
         OSError: the file cannot be written; nothing is left behind.
     """
     with complete_file(path) as file:
-        file.write(sealed_png(png(preview(charted, texture))))
+        file.write(sealed_png(png(preview(charted, texture, is_y_up=is_y_up))))
 
 
-def preview(charted: Charted, texture: Picture) -> Picture:
+def preview(charted: Charted, texture: Picture, *, is_y_up: bool = False) -> Picture:
     """(SIDE, 3 SIDE, 3) the surface from two opposite sides, and the layout in its texture.
 
     Args:
         charted: the mesh, and its map in the unit square.
         texture: (N, N, 3) pixels, first row at the top.
+        is_y_up: whether the y axis points upwards, and not z.
     """
     mesh, held = charted
     face, weights = _evenly_spread(mesh)
@@ -55,6 +56,8 @@ def preview(charted: Charted, texture: Picture) -> Picture:
             (held.uv, held.corners),
         )
     )
+    if is_y_up:
+        points, normals = (of[:, [0, 2, 1]] * [1.0, -1.0, 1.0] for of in (points, normals))
     colours = _looked_up(texture, uv)
     sides = [_seen(points, normals, colours, np.array(DIRECTION) * side) for side in (1, -1)]
     return np.concatenate([*sides, _layout(charted, texture)], axis=1)

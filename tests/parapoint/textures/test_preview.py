@@ -74,3 +74,13 @@ def test_the_picture_shows_both_sides_and_the_layout() -> None:
     for begin in (0, 64):  # the square fills part of each picture, and white is around it
         white = (picture[:, begin : begin + 64] == 255).all(axis=2).mean()
         assert 0.2 < white < 0.9
+
+
+def test_what_points_upwards_is_seen_above() -> None:
+    """A slab whose y axis points upwards is seen as the one that is laid with z upwards."""
+    points = np.array([[0.0, 0, 0], [2, 0, 0], [2, 1, 0.5], [0, 1, 0.5]])
+    laid = points[:, [0, 2, 1]] * [1, -1, 1]
+    of_y, of_z = (Charted(Mesh(at, SQUARE.mesh.faces), SQUARE.map) for at in (points, laid))
+    seen = room.preview(of_y, TEXTURE, is_y_up=True)
+    assert_array_equal(seen, room.preview(of_z, TEXTURE))
+    assert (seen != room.preview(of_y, TEXTURE)).any()
