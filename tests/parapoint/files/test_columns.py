@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from parapoint.files.attributes import colours_of
 from parapoint.files.reading import read_surface
 
 PLACES = np.array([[0.25, 1.5, 2], [3, 4.5, 5], [6, 7.25, 8.5], [9, 1, 2.5]])
@@ -63,3 +64,10 @@ def test_laz_is_read_in_every_kind_of_point(tmp_path, kind):
     cloud.write(str(tmp_path / "a.laz"))
     assert (tmp_path / "a.laz").read_bytes()[104] == 128 + kind
     assert_allclose(read_surface(tmp_path / "a.laz").points, points, atol=1e-9)
+
+
+def test_fractions_above_1_are_no_colours():
+    assert colours_of(np.array([[0.5, 1.0, 0.0]])) is not None
+    assert colours_of(np.array([[2.0, 255.0, 0.0]])).dtype == np.uint8
+    assert colours_of(np.array([[0.5, 1.5, 0.0]])) is None
+    assert colours_of(np.array([[2.0, 70_000.0, 0.0]])) is None
