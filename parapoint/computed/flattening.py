@@ -122,8 +122,8 @@ def flattened(
         if lines is None:
             raise
         raise InputError(
-            f"the points lie on scan lines that show no surface ({error}); smooth the lines, or scan "
-            "more of them"
+            f"the points lie on scan lines that show no surface ({error}); smooth the lines, or "
+            "scan more of them"
         ) from None
 
 
