@@ -92,6 +92,13 @@ def bench(session: nox.Session) -> None:
 
 
 @nox.session
+def readme(session: nox.Session) -> None:
+    """Run what README.md prints, command by command, long ones on small models."""
+    install(session, "dev")
+    session.run("pytest", "tests/test_printed_commands.py", "tests/test_docs.py", *session.posargs)
+
+
+@nox.session
 def docs(session: nox.Session) -> None:
     """Build the site into build/site; a broken link is an error."""
     install(session, "docs")

@@ -15,13 +15,16 @@ from parapoint.computed.computed_map import ComputedMap
 from parapoint.files.attributes import unit_colours
 from parapoint.method import UnsupportedError
 from parapoint.surfaces.parameterization import Charted, PointParameterization
-from parapoint.surfaces.surface import FloatArray, PointCloud, Surface
+from parapoint.surfaces.surface import BoolArray, FloatArray, PointCloud, Surface
 from parapoint.textures.baking import Pixels, baked
 from parapoint.textures.packing import packed
 from parapoint.textures.texels import texels
 
 HELD_OUT = 0.2
 """Share of the points that no texture is baked from, and that test it."""
+
+STREAM = 20240317
+"""Any number; it keeps the draw of the points held out apart from all others."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +58,7 @@ class Textured:
         if not isinstance(surface, PointCloud) or "colours" not in surface.attributes:
             raise UnsupportedError("takes a point cloud with colours")
         colours = surface.attributes["colours"][:, :3]
-        is_seen = np.random.default_rng(seed).random(len(surface.points)) > HELD_OUT
+        is_seen = seen_points(len(surface.points), seed)
         normals = None if surface.normals is None else surface.normals[is_seen]
         seen = PointCloud(
             surface.points[is_seen], normals, attributes={"colours": colours[is_seen]}
@@ -81,6 +84,15 @@ class Textured:
             "charts": int(charted.map.charts().max()) + 1,
         }
         return PointParameterization(uv, report=report)
+
+
+def seen_points(count: int, seed: int) -> BoolArray:
+    """(count,) which points a texture is baked from.
+
+    The draw has a stream of its own: with that of the cloud's own sampling whole regions of its
+    surface were held out.
+    """
+    return np.asarray(np.random.default_rng((STREAM, seed)).random(count) > HELD_OUT)
 
 
 def nearest_baked(charted: Charted, cloud: PointCloud, size: int) -> Pixels:

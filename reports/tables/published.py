@@ -107,6 +107,12 @@ def claim_text(case: str) -> str:
     return entry.claim or "" if entry else ""
 
 
+def claim_reason(case: str) -> str:
+    """The reason for `claim_text`, in a sentence; "" where there is none."""
+    entry = model(case)
+    return entry.claim_reason if entry else ""
+
+
 def published_values(case: str) -> dict[str, float]:
     """The published conformality of the model that `case` stands for, by method."""
     entry = model(case)

@@ -32,7 +32,14 @@ from reports.tables.notes import (
     method_notes,
 )
 from reports.tables.overall import overall
-from reports.tables.published import AUTHORS, Verdict, claim_text, published_values, verdicts
+from reports.tables.published import (
+    AUTHORS,
+    Verdict,
+    claim_reason,
+    claim_text,
+    published_values,
+    verdicts,
+)
 from reports.tables.statistics import paired_tests, seed_variance
 from reports.tables.table import (
     CASE,
@@ -349,6 +356,7 @@ def against_published(contents: Contents) -> Table | None:
         blocks=tuple(tuple(rows) for rows in blocks.values()),
         notes=(
             *(f"{source}: {figure.trust}." for source, figure in sources.items()),
+            *(f"{case}: {reason}" for case in blocks if (reason := claim_reason(case))),
             environment_note(contents),
         ),
     )

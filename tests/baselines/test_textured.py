@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.spatial import cKDTree
 
-from baselines.textured import Textured, looked_up, nearest_baked
+from baselines.textured import Textured, looked_up, nearest_baked, seen_points
 from benchmarks.cases.coloured import coloured, wave_colours
 from parapoint import Mesh, Parameterization, PointCloud
 from parapoint.method import UnsupportedError
@@ -44,7 +45,7 @@ def test_ours_reads_back_better_than_the_nearest_colour() -> None:
     made = Textured(texels=128).parameterize(cloud, seed=0)
     assert len(made.uv) == 3000
     assert made.report["held_out"] == pytest.approx(600, abs=60)
-    seen = cloud.points[np.random.default_rng(0).random(3000) > 0.2]
+    seen = cloud.points[seen_points(3000, 0)]
     assert made.report["bake_psnr"] > 30
     rows = np.flatnonzero(~np.isin(cloud.points[:, 0], seen[:, 0]))
     nearest = nearest_baked(PLATE, PointCloud(seen, attributes={"colours": colours_at(seen)}), 128)
@@ -59,3 +60,11 @@ def colours_at(points) -> np.ndarray:
 def test_a_cloud_without_colours_is_skipped() -> None:
     with pytest.raises(UnsupportedError, match="with colours"):
         Textured().parameterize(PointCloud(PLATE.mesh.vertices), seed=0)
+
+
+def test_points_held_out_lie_among_the_others() -> None:
+    cloud = coloured(PLATE.mesh, 5.0, 4000)
+    is_seen = seen_points(4000, 0)
+    assert is_seen.mean() == pytest.approx(0.8, abs=0.03)
+    near = cKDTree(cloud.points[is_seen]).query(cloud.points[~is_seen])[0]
+    assert np.median(near) < 0.75 / np.sqrt(is_seen.sum())  # of a random draw 0.47

@@ -591,6 +591,9 @@ def test_las(tmp_path):
     assert "ends early" in fault(tmp_path, "c.las", data[:-1])
     data[107:111] = b"\xff\xff\xff\xff"  # two points that claim to be four thousand million
     assert "4294967295 points" in fault(tmp_path, "d.las", data)
+    data = bytearray((tmp_path / "a.las").read_bytes())
+    data[100:104] = b"\xff\xff\xff\x7f"
+    assert "2147483647 variable records" in fault(tmp_path, "e.las", data)
 
 
 def test_a_cloud_without_a_finite_point_is_refused(tmp_path):

@@ -33,3 +33,10 @@ def test_faces_over_a_tear_are_left_out(height: float) -> None:
     known = RNG.random((3000, 2))
     torn = gridded(known, lambda uv: np.column_stack([uv, height * (uv[:, 0] > 0.5)])).mesh
     assert torn.component_count == 2
+
+
+def test_points_that_stand_twice_cover_the_plane_as_single_ones_do() -> None:
+    """Their median distance to the nearest other point is 0."""
+    known = np.repeat(RNG.random((20_000, 2)), 2, axis=0)
+    mesh, _ = gridded(known, lambda uv: np.column_stack([uv, 0 * uv[:, 0]]))
+    assert_allclose(mesh.face_areas.sum(), 1, rtol=0.1)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from parapoint import InputError, Mesh, Parameterization, PointParameterization
+from parapoint.surfaces.parameterization import Charted
 
 # Two triangles of a square: 3-2 over 0-1, diagonal 0-2.
 SQUARE = Mesh([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
@@ -61,3 +62,19 @@ def test_bad_parameterizations_are_refused(uv, corners, message):
 def test_a_point_parameterization_must_be_finite():
     with pytest.raises(InputError, match="uv must be finite; row 1"):
         PointParameterization([[0, 0], [np.inf, 0]])
+
+
+def test_a_corner_with_itself_is_no_seam():
+    """Two faces that name a vertex twice, in charts of their own."""
+    mesh = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2], [0, 0, 1], [0, 0, 2]])
+    uv = np.arange(18.0).reshape(9, 2)
+    seams = Parameterization(uv, np.arange(9).reshape(3, 3)).seams(mesh)
+    assert seams.tolist() == [[0, 1], [0, 2]]
+
+
+def test_the_other_side_of_a_map_is_mirrored_and_flips_nothing():
+    mesh = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    turned = Charted(mesh, Parameterization([[0, 0], [1, 0], [0, 1]], mesh.faces)).turned()
+    assert turned.mesh.faces.tolist() == [[2, 1, 0]]
+    (a, b), (c, d), (e, f) = turned.map.uv[turned.map.corners[0]]
+    assert (c - a) * (f - b) - (d - b) * (e - a) > 0

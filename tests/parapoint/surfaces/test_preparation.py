@@ -239,3 +239,21 @@ def test_shelves_hold_every_box_apart_and_fill_a_page_that_is_about_square():
     width, height = high.max(axis=0) - low.min(axis=0)
     assert sizes.prod(axis=1).sum() > 0.6 * width * height
     assert 0.6 < width / height < 1.6
+
+
+@pytest.mark.parametrize("sizes", [(1.0, 5.0), (5.0, 1.0)])
+def test_the_report_of_several_parts_is_that_of_the_largest(sizes):
+    disk = irregular_disk()
+    count = len(disk.vertices)
+    both = Mesh(
+        np.concatenate([sizes[0] * disk.vertices, sizes[1] * disk.vertices + 50]),
+        np.concatenate([disk.faces, disk.faces + count]),
+    )
+    ready = prepared(both, frozenset({"faces", "connected"}))
+    maps = [
+        Parameterization(part.vertices[:, :2], part.faces, report={"area": part.face_areas.sum()})
+        for part in ready.parts
+    ]
+    report = ready.joined(maps).report
+    assert report["components"] == 2
+    assert report["largest"]["area"] == pytest.approx(25 * disk.face_areas.sum())

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from parapoint import InputError, Mesh, PointCloud
-from parapoint.surfaces.surface import flat_faces
+from parapoint.surfaces.surface import flat_faces, vertex_normals
 
 TETRAHEDRON = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
 CORNERS = [[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
@@ -88,6 +88,11 @@ def test_boundary_loops_are_longest_first():
     outer, inner = Mesh(ANNULUS_VERTICES, ANNULUS).boundary_loops
     assert sorted(outer) == [0, 1, 2, 3]
     assert sorted(inner) == [4, 5, 6, 7]
+    # The same with the vertices of the inner loop first.
+    inside_out = Mesh(np.roll(ANNULUS_VERTICES, 4, axis=0), (np.array(ANNULUS) + 4) % 8)
+    outer, inner = inside_out.boundary_loops
+    assert sorted(outer) == [4, 5, 6, 7]
+    assert sorted(inner) == [0, 1, 2, 3]
 
 
 def test_unreferenced_vertices_are_kept_and_do_not_count():
@@ -157,3 +162,12 @@ def test_flat_faces_are_told_by_their_own_edges(shift, size):
     vertices = (np.concatenate([large, small, thin, line, np.zeros((3, 3))]) + shift) * size
     faces = np.arange(15).reshape(-1, 3)
     assert flat_faces(vertices, faces).tolist() == [False, False, False, True, True]
+
+
+def test_vertex_normals_are_means_by_area():
+    """A floor of three times the area of a wall, which meet at two vertices."""
+    points = [[0, 0, 0], [1, 0, 0], [0, 3, 0], [0, 0, 1]]
+    mesh = Mesh(points, [[0, 1, 2], [1, 0, 3]])  # upwards, and towards y
+    normals = vertex_normals(mesh)
+    both = np.array([0, 1, 3]) / np.sqrt(10)
+    assert normals == pytest.approx(np.array([both, both, [0, 0, 1], [0, 1, 0]]))

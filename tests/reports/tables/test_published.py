@@ -4,7 +4,7 @@ import pytest
 
 from benchmarks.cases.models import registry
 from reports.contents import contents
-from reports.tables.published import claim_text, published_values, verdicts
+from reports.tables.published import claim_reason, claim_text, published_values, verdicts
 from reports.tables.suites import against_published
 
 from ..conftest import DEVIL, HAND, NEFERTITI
@@ -79,6 +79,7 @@ def test_the_table_names_model_metric_unit_tolerance_trust_and_verdict(results):
     notes = " ".join(table.notes)
     assert "ParaPoint (arXiv 2403.10349), supplement: as printed" in notes
     assert "arXiv 2405.14633): second hand" in notes
+    assert f"{HAND}: {claim_reason(HAND)}" in table.notes
 
 
 def test_no_figure_is_invented():
