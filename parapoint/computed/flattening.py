@@ -21,6 +21,7 @@ from parapoint.computed.parts import Distortion, parts_kept
 from parapoint.computed.reconstruction import ReconstructionError, defects, triangulation
 from parapoint.computed.scale import even_scale
 from parapoint.computed.seams import seamed
+from parapoint.errors import InputError
 from parapoint.planar.bijection import bijective_map
 from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.cutting import origin
@@ -112,8 +113,24 @@ def flattened(
 
     Raises:
         ReconstructionError: the points show no surface that can be followed and flattened.
+        InputError: nor do the lines that they are scanned in; no training would see more.
     """
     lines = thinned(points)
+    try:
+        return _flattened(points, lines, deadline, distortion)
+    except ReconstructionError as error:
+        if lines is None:
+            raise
+        raise InputError(
+            f"the points lie on scan lines that show no surface ({error}); smooth the lines, or "
+            "scan more of them"
+        ) from None
+
+
+def _flattened(
+    points: FloatArray, lines: Lines | None, deadline: float, distortion: Distortion
+) -> Flattened:
+    """See `flattened`; `lines` are the scan lines of the points, where there are any."""
     rows = np.arange(len(points)) if lines is None else lines.rows
     mesh, is_denoised = _still(points[rows], lines)
     reached = np.flatnonzero(mesh.referenced)

@@ -1,7 +1,10 @@
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
 
 from benchmarks.cases.builtin import sphere, torus
+from parapoint.computed import flattening
 from parapoint.computed.flattening import (
     FlatMap,
     _chosen_copies,
@@ -9,6 +12,7 @@ from parapoint.computed.flattening import (
     flat_map,
 )
 from parapoint.computed.reconstruction import ReconstructionError, triangulation
+from parapoint.errors import InputError
 from parapoint.planar.embedding import few_edges_graph
 from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.cutting import cut_along
@@ -188,3 +192,12 @@ def test_a_map_keeps_the_area() -> None:
     flat, mesh = flat_map(points), triangulation(points)
     assert flat.facts["seam_edges"] == 0
     assert signed_areas(flat.uv, mesh.faces).sum() == pytest.approx(mesh.face_areas.sum())
+
+
+@pytest.mark.parametrize(("step", "error"), [(1 / 30, InputError), (1.0, ReconstructionError)])
+def test_scan_lines_without_a_surface_get_advice(monkeypatch, step: float, error: type) -> None:
+    # A sheet of even points may still be trained; of lines no training would see more.
+    x, y = (of.ravel() for of in np.meshgrid(np.arange(0, 20, step), np.arange(20.0)))
+    monkeypatch.setattr(flattening, "bijective_map", Mock(side_effect=RuntimeError("no way")))
+    with pytest.raises(error, match="no way"):
+        flat_map(np.column_stack([x, y, 0.1 * np.sin(y)]))
