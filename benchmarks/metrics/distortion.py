@@ -23,6 +23,7 @@ from functools import cached_property
 import numpy as np
 
 from parapoint.errors import InputError
+from parapoint.surfaces.areas import cross
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
 
@@ -36,7 +37,7 @@ CLIPPED_RATIO = 10.0
 """Largest area ratio that PartUV counts; larger ones count as this one."""
 
 
-def power_of_two(values: FloatArray) -> float:
+def power_above(values: FloatArray) -> float:
     """The power of two just above the largest absolute value; 1 if all values are 0.
 
     To divide by it is exact, and keeps squares and products from overflow and underflow.
@@ -80,8 +81,8 @@ def triangles(mesh: Mesh, parameterization: Parameterization) -> Triangles:
     Raises:
         InputError: coordinates are so large that areas overflow.
     """
-    scale = power_of_two(mesh.vertices[mesh.faces])
-    uv_scale = power_of_two(parameterization.uv[parameterization.corners])
+    scale = power_above(mesh.vertices[mesh.faces])
+    uv_scale = power_above(parameterization.uv[parameterization.corners])
     for what, size in (("vertices", scale), ("uv", uv_scale)):
         if size > LARGEST:
             raise InputError(
@@ -94,7 +95,7 @@ def triangles(mesh: Mesh, parameterization: Parameterization) -> Triangles:
     uv_sides = [images[(k + 2) % 3] - images[(k + 1) % 3] for k in range(3)]
 
     double_area = _norm(np.cross(sides[2], -sides[1]))
-    double_uv_area = _cross(uv_sides[2], -uv_sides[1])
+    double_uv_area = cross(uv_sides[2], -uv_sides[1])
     no_area = _is_degenerate(double_area, sides)
     no_uv_area = _is_degenerate(np.abs(double_uv_area), uv_sides)
     double_area = np.where(no_area, 0.0, double_area)
@@ -115,10 +116,6 @@ def triangles(mesh: Mesh, parameterization: Parameterization) -> Triangles:
 
 def _norm(vectors: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(np.einsum("ij,ij->i", vectors, vectors)), dtype=np.float64)
-
-
-def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], dtype=np.float64)
 
 
 def _is_degenerate(double_area: FloatArray, sides: list[FloatArray]) -> BoolArray:

@@ -19,6 +19,7 @@ import numpy as np
 
 from benchmarks.metrics.boxes import Hierarchy
 from benchmarks.metrics.crowds import Crowd
+from parapoint.surfaces.areas import cross
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray
 
@@ -126,7 +127,7 @@ class _Faces:
         self.images = images = np.where((sign < 0)[:, None, None], images[:, ::-1], images)
         self.present = np.flatnonzero(sign)
         self.extent = float(np.abs(images).max(initial=0.0))
-        self.double_area = np.abs(_cross(images[:, 1] - images[:, 0], images[:, 2] - images[:, 0]))
+        self.double_area = np.abs(cross(images[:, 1] - images[:, 0], images[:, 2] - images[:, 0]))
         self.longest = np.maximum.reduce(
             [np.hypot(*(images[:, k] - images[:, (k + 1) % 3]).T) for k in range(3)]
         )
@@ -344,7 +345,3 @@ def _covered(x: FloatArray, y: FloatArray, line: IntArray, height: FloatArray) -
     reached = np.maximum.accumulate(right)
     fresh = right - np.maximum(left, np.concatenate([[-np.inf], reached[:-1]]))
     return float(np.maximum(fresh, 0.0).sum())
-
-
-def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], dtype=np.float64)

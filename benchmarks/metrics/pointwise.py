@@ -14,7 +14,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
-from benchmarks.metrics.distortion import mean, power_of_two
+from benchmarks.metrics.distortion import mean, power_above
 from benchmarks.metrics.seams import QUARTILE, SPANNING_LENGTH, SPANNING_STRETCH, square_side
 from benchmarks.metrics.usability import LEAST_PART, STARVED
 from benchmarks.metrics.welding import places
@@ -145,7 +145,7 @@ def point_map(cloud: PointCloud, parameterization: PointParameterization) -> Poi
     if covered.sum() < 4:
         raise InputError(f"the map has a place for {covered.sum()} points; 4 are needed")
     points, uv, share = points[covered], uv[covered], float(covered.mean())
-    return PointMap(points / power_of_two(points), uv / power_of_two(uv), share)
+    return PointMap(points / power_above(points), uv / power_above(uv), share)
 
 
 def nearest_others(tree: cKDTree, k: int) -> IntArray:

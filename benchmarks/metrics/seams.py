@@ -27,7 +27,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.metrics.distortion import Triangles, power_of_two
+from benchmarks.metrics.distortion import Triangles, power_above
 from benchmarks.metrics.overlap import Overlaps, covered_area
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
@@ -136,7 +136,7 @@ def spanning_faces(
 
 def spanning_edges(mesh: Mesh, parameterization: Parameterization) -> BoolArray:
     """(E,) whether an edge of `parameterization.edges` is spanning, by the same rule."""
-    uv = parameterization.uv / power_of_two(parameterization.uv)
+    uv = parameterization.uv / power_above(parameterization.uv)
     edges, corners = parameterization.edges, parameterization.corners
     uv_length = _lengths(uv[edges[:, 1]] - uv[edges[:, 0]])
     spanning = uv_length > SPANNING_LENGTH * square_side(_used(parameterization, uv))
@@ -144,7 +144,7 @@ def spanning_edges(mesh: Mesh, parameterization: Parameterization) -> BoolArray:
     wanted = np.zeros(len(uv), dtype=bool)
     wanted[edges[spanning]] = True
     near = np.flatnonzero(wanted[edges].any(axis=1))
-    vertices = mesh.vertices / power_of_two(mesh.vertices)
+    vertices = mesh.vertices / power_above(mesh.vertices)
     vectors = _vectors(vertices, mesh, parameterization, near)
     length = _lengths(vectors)
     known = length > 0

@@ -17,7 +17,7 @@ import numpy as np
 
 from parapoint.planar.embedding import FLATTEST, embedded_in_disk
 from parapoint.planar.scaffold import EXACT, LEAST_GAIN, descended, excess, of_area_one
-from parapoint.surfaces.areas import signed_areas
+from parapoint.surfaces.areas import cross, signed_areas
 from parapoint.surfaces.surface import FloatArray, Mesh
 
 CLOSE = 5e-4
@@ -98,8 +98,7 @@ def is_bijective(mesh: Mesh, uv: FloatArray) -> bool:
 
 def _side(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
     """(n,) on which side of the line from a to b the point c is: 1 left, -1 right, 0 on it."""
-    first, second = b - a, c - a
-    return np.asarray(np.sign(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]))
+    return np.asarray(np.sign(cross(b - a, c - a)))
 
 
 def _led(mesh: Mesh, flat: Mesh, uv: FloatArray, deadline: float) -> FloatArray:

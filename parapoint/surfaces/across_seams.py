@@ -13,6 +13,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.sparse import csgraph
 
+from parapoint.surfaces.areas import cross
 from parapoint.surfaces.cutting import disk_cut, edge_graph, edge_lengths, edge_mask, path_to
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
@@ -165,7 +166,8 @@ def opened(mesh: Mesh, uv: FloatArray, across: BoolArray) -> Parameterization:
     corners: IntArray = mesh.faces.copy()
     count = len(uv)
     sound = ~torn.any(axis=1)
-    doubled = _doubled_areas(uv[mesh.faces[sound]])
+    corner, left, right = np.moveaxis(uv[mesh.faces[sound]], 1, 0)
+    doubled = cross(left - corner, right - corner)
     mirror = 1.0 if doubled.sum() >= 0 else -1.0
     real = mesh.face_areas[sound].sum()
     scale = float(np.sqrt(np.abs(doubled).sum() / 2 / real)) if real > 0 else 1.0
@@ -190,9 +192,3 @@ def opened(mesh: Mesh, uv: FloatArray, across: BoolArray) -> Parameterization:
         corners[face, at[2]] = count
         count += 1
     return Parameterization(np.concatenate(rows), corners)
-
-
-def _doubled_areas(images: FloatArray) -> FloatArray:
-    """(F,) twice the signed areas of triangles (F, 3, 2)."""
-    first, second = images[:, 1] - images[:, 0], images[:, 2] - images[:, 0]
-    return np.asarray(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])

@@ -14,6 +14,11 @@ MOST_STARVED = 0.02
 """Share of the surface that a map may starve before that is a fault of it."""
 
 
+def cross(first: FloatArray, second: FloatArray) -> FloatArray:
+    """(N,) cross products of plane vectors (N, 2), positive where the second lies to the left."""
+    return np.asarray(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0], dtype=np.float64)
+
+
 def signed_areas(uv: FloatArray, faces: IntArray) -> FloatArray:
     """(F,) area of each triangle in the plane, negative where it is turned over."""
     return np.asarray(igl.doublearea(uv, faces) / 2, dtype=np.float64)
