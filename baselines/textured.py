@@ -33,6 +33,8 @@ STREAM = 20240317
 class Textured:
     """A coloured cloud as a textured mesh, tested by the colours of points that it has not seen.
 
+    A cloud without colours is painted with its coordinates.
+
     A share of the points is held out (HELD_OUT, drawn by the seed). Of the others a mesh with a map
     is made, and a texture is baked. The points held out are projected onto the mesh and read their
     colours from the texture, bilinearly; the report has the peak signal-to-noise ratio.
@@ -54,12 +56,12 @@ class Textured:
         """The map of the mesh, at all points of the cloud.
 
         Raises:
-            UnsupportedError: the surface is no cloud with colours; pymeshlab is not installed.
+            UnsupportedError: the surface is a mesh; pymeshlab is not installed.
             FlatteningError, ReconstructionError: no mesh or no map could be made.
         """
-        if not isinstance(surface, PointCloud) or "colours" not in surface.attributes:
-            raise UnsupportedError("takes a point cloud with colours")
-        colours = surface.attributes["colours"][:, :3]
+        if not isinstance(surface, PointCloud):
+            raise UnsupportedError("takes a point cloud; the surface is a mesh")
+        colours = surface.attributes.get("colours", _places(surface.points))[:, :3]
         is_seen = seen_points(len(surface.points), seed)
         normals = None if surface.normals is None else surface.normals[is_seen]
         seen = PointCloud(
@@ -86,6 +88,12 @@ class Textured:
             "charts": int(charted.map.charts().max()) + 1,
         }
         return PointParameterization(uv, report=report)
+
+
+def _places(points: FloatArray) -> FloatArray:
+    """(N, 3) the places of points in their bounding cube, from 0 to 1."""
+    low = points.min(axis=0)
+    return np.asarray((points - low) / max(float((points - low).max()), 1e-300))
 
 
 def seen_points(count: int, seed: int) -> BoolArray:

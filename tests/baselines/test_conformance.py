@@ -21,6 +21,7 @@ ARGUMENTS = {
     "computed": {"points": 150},
     "unwrap": {"points": 120},
     "meshed": {"reconstruction": "ball_pivoting"},  # the faster one
+    "textured": {"texels": 64},
     "external": {"command": COPY},
     "fam": {"points": 120, "subset": 100, "iterations": 2},
     "nuvo": {"points": 120, "subset": 100, "iterations": 2},

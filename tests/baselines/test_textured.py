@@ -57,9 +57,12 @@ def colours_at(points) -> np.ndarray:
     return np.rint(255 * wave_colours(points, 5.0)).astype(np.uint8)
 
 
-def test_a_cloud_without_colours_is_skipped() -> None:
-    with pytest.raises(UnsupportedError, match="with colours"):
-        Textured().parameterize(PointCloud(PLATE.mesh.vertices), seed=0)
+def test_a_cloud_without_colours_shows_its_coordinates_and_a_mesh_is_skipped() -> None:
+    points = np.column_stack([RNG.random((400, 2)), np.zeros(400)])
+    report = Textured(texels=64).parameterize(PointCloud(points), seed=0).report
+    assert report["bake_psnr"] > 35
+    with pytest.raises(UnsupportedError, match="is a mesh"):
+        Textured().parameterize(PLATE.mesh, seed=0)
 
 
 def test_points_held_out_lie_among_the_others() -> None:
