@@ -55,20 +55,21 @@ def triangle_rows(vertices: FloatArray, sizes: IntArray, corners: IntArray) -> I
     rows = np.asarray(start + (place + shift) % size)
     first_row = np.cumsum(count) - count
     steps = 0.0
-    for polygon in np.flatnonzero(sizes > 4).tolist():
-        begin, n = int(starts[polygon]), int(sizes[polygon])
-        ring = vertices[corners[begin : begin + n]] / scale
-        if (plane := _plane(ring)) is None:
-            continue
-        steps += _steps(plane)
-        if n > MOST_CORNERS or steps > MOST_STEPS:
-            raise InputError(
-                f"face {polygon} has {n} corners, too many to be cut into triangles here"
-                + ("" if n > MOST_CORNERS else ", since it touches or crosses itself")
-                + "; cut it before"
-            )
-        if (cut := ears(plane)) is not None:
-            rows[first_row[polygon] : first_row[polygon] + n - 2] = begin + cut
+    for n in np.unique(sizes[sizes > 4]).tolist():
+        polygons = np.flatnonzero(sizes == n)
+        rings = vertices[corners[starts[polygons, None] + np.arange(n)]] / scale
+        folded, planes = _folded(rings)
+        for polygon, plane in zip(polygons[folded].tolist(), planes, strict=True):
+            steps += _steps(plane)
+            if n > MOST_CORNERS or steps > MOST_STEPS:
+                raise InputError(
+                    f"face {polygon} has {n} corners, too many to be cut into triangles here"
+                    + ("" if n > MOST_CORNERS else ", since it touches or crosses itself")
+                    + "; cut it before"
+                )
+            if (cut := ears(plane)) is not None:
+                first = first_row[polygon]
+                rows[first : first + n - 2] = starts[polygon] + cut
     return rows
 
 
@@ -86,20 +87,24 @@ def corner_rows(places: IntArray, rows: IntArray) -> tuple[IntArray, BoolArray]:
     return row, (row[places] != rows).any(axis=1)
 
 
-def _plane(ring: FloatArray) -> FloatArray | None:
-    """(n, 2) a polygon (n, 3) in its mean plane, counter-clockwise.
+def _folded(rings: FloatArray) -> tuple[BoolArray, FloatArray]:
+    """(N,) the polygons (N, n, 3) whose fan from the first corner is wrong, and these in the plane.
 
-    None where the fan from its first corner is right, or it has no area.
+    The second are (M, n, 2), each in its mean plane and counter-clockwise. A polygon without area
+    has no plane; its fan is as good as any.
     """
-    edges = ring[1:] - ring[0]
-    fan = np.cross(edges[:-1], edges[1:])
-    normal = fan.sum(axis=0)
-    length = float(np.linalg.norm(normal))
-    if length == 0 or (fan @ normal > THIN * length**2).all():
-        return None
-    drop = int(np.abs(normal).argmax())
-    x, y = ((1, 2), (2, 0), (0, 1))[drop]
-    return np.asarray((ring - ring[0])[:, [x, y]] * [1.0, np.sign(normal[drop])])
+    edges = rings[:, 1:] - rings[:, :1]
+    fan = np.cross(edges[:, :-1], edges[:, 1:])
+    normal = fan.sum(axis=1)
+    squared = (normal**2).sum(axis=1)
+    is_right = ((fan * normal[:, None]).sum(axis=2) > THIN * squared[:, None]).all(axis=1)
+    folded = ~is_right & (squared > 0)
+    rings, normal = rings[folded], normal[folded]
+    drop = np.abs(normal).argmax(axis=1)
+    kept = np.array([(1, 2), (2, 0), (0, 1)])[drop]
+    planes = np.take_along_axis(rings - rings[:, :1], kept[:, None], axis=2)
+    planes[..., 1] *= np.sign(np.take_along_axis(normal, drop[:, None], axis=1))
+    return folded, planes
 
 
 def _steps(plane: FloatArray) -> float:
