@@ -91,13 +91,6 @@ def place(tmp_path_factory):
     (folder / "my_map.obj").write_text(obj(mesh, uv=True))
     (folder / "scan.ply").write_text(coloured(mesh.vertices))
     (folder / "dense.ply").write_text(coloured(sheet(40).vertices))
-    (folder / "planar.py").write_text(
-        next(
-            text
-            for text in re.findall(r"```python\n(.*?)```", README, re.DOTALL)
-            if "Planar" in text
-        )
-    )
     return folder
 
 
@@ -154,6 +147,18 @@ def test_a_command_of_the_readme_works_as_printed(words, place):
     run(words)
     if "disk" in words:
         assert (place / "results/disk/runs.jsonl").is_file()
+
+
+def test_the_example_of_the_readme_prints_what_it_says(capsys):
+    ((code, printed),) = re.findall(
+        r"```python\n(.*?)```\n\n```text\n(.*?)```", README, flags=re.DOTALL
+    )
+    exec(compile(code, "README.md", "exec"), {})  # noqa: S102 (our own example)
+    assert capsys.readouterr().out == printed
+
+
+def test_the_readme_can_be_read_in_one_go():
+    assert len(README.splitlines()) <= 120
 
 
 def test_the_commands_of_a_page_name_its_folder_and_work(place):
