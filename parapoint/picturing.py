@@ -44,10 +44,19 @@ def figure(points: FloatArray, uv: FloatArray, on_seam: BoolArray) -> Figure:
         from matplotlib.figure import Figure
     except ModuleNotFoundError:
         raise InputError("a plot needs matplotlib: pip install matplotlib") from None
+
+    class Plot(Figure):
+        """A figure that a notebook shows by itself, without pyplot."""
+
+        def _repr_png_(self) -> bytes:
+            file = io.BytesIO()
+            self.savefig(file, format="png")
+            return file.getvalue()
+
     drawn = slice(None, None, len(points) // MOST_DRAWN + 1)
     points, uv = points[drawn], uv[drawn]
     colours = np.where(on_seam[drawn, None], 0.0, _hues(uv))
-    made = Figure(figsize=(9, 4.5), layout="constrained")
+    made = Plot(figsize=(9, 4.5), layout="constrained")
     space = made.add_subplot(1, 2, 1, projection="3d")
     space.scatter(points[:, 0], points[:, 1], points[:, 2], c=colours, s=2)
     space.set_box_aspect(np.ptp(points, axis=0))

@@ -144,6 +144,7 @@ def test_a_plot_is_a_figure_that_can_be_restyled(fitted) -> None:
     np.testing.assert_allclose(drawn, fitted.transform(fitted.points_))
     plane.set_title("my map")
     assert isinstance(figure, mpl.figure.Figure)
+    assert figure._repr_png_().startswith(b"\x89PNG")  # a notebook shows it without pyplot
 
 
 def test_surfaces_of_other_libraries_are_taken() -> None:
