@@ -10,7 +10,7 @@ from scipy.sparse import csgraph
 from parapoint.planar.descent import LEAST_ENERGY, Run
 from parapoint.surfaces.areas import MOST_STARVED, starved_faces, starved_share
 from parapoint.surfaces.cutting import edge_graph, edge_lengths, path_to
-from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh
+from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
 
 PRICE = 1.0
 """What the symmetric Dirichlet energy (4 at least) must fall by for each sqrt(area) of seam, unless
@@ -119,10 +119,26 @@ def _longer(run: Run, need: Need) -> Run | None:
             # No branch could gain more than all of the excess around.
             if excess[np.isfinite(near)[run.mesh.faces].any(axis=1)].sum() > least:
                 break
-        longer = run.cut(np.array(path_to(previous, tip)), run.energy - least)
+        path = np.array(path_to(previous, tip))
+        longer = run.cut(path, run.energy - least)
         if longer is not None and run.energy - longer.energy > least:
-            return longer
+            return _as_short_as_enough(run, path, longer, need)
     return None
+
+
+def _as_short_as_enough(run: Run, path: IntArray, longer: Run, need: Need) -> Run:
+    """The run `longer` by a path, or by as little of it as brings the energy below its bound."""
+    if need.of(longer) or run.energy <= need.most_energy:
+        return longer
+    too_short, enough = 0, len(path) - 1  # edges, from the seam on
+    while enough - too_short > 1:
+        middle = (too_short + enough) // 2
+        shorter = run.cut(path[len(path) - 1 - middle :], need.most_energy)
+        if shorter is None or need.of(shorter):
+            too_short = middle
+        else:
+            longer, enough = shorter, middle
+    return longer
 
 
 def _rim(mesh: Mesh) -> float:

@@ -1,9 +1,12 @@
 """Growth of the seam to where places are starved of area."""
 
+import numpy as np
+import pytest
+
 from benchmarks.cases import builtin
 from benchmarks.metrics.evaluation import evaluate
 from parapoint.planar.descent import Run
-from parapoint.planar.growth import grown
+from parapoint.planar.growth import Need, _as_short_as_enough, grown
 from parapoint.surfaces.areas import MOST_STARVED, starved_share
 from parapoint.surfaces.parameterization import Parameterization
 
@@ -21,3 +24,31 @@ def test_a_seam_leads_to_what_is_starved() -> None:
     found = evaluate(mesh, Parameterization(run.uv, run.mesh.faces))
     assert found["starved_area_fraction"] <= MOST_STARVED
     assert found["flipped_fraction"] == found["overlap_area"] == 0
+
+
+class Branching:
+    """A run whose energy falls by 0.1 for each edge of a branch."""
+
+    def __init__(self, energy: float) -> None:
+        self.energy = energy
+
+    def cut(self, path: np.ndarray, goal: float) -> "Branching":
+        assert path[-1] == 0  # where the seam is
+        assert goal == 4.45
+        return Branching(5 - 0.1 * (len(path) - 1))
+
+
+@pytest.mark.parametrize(("edges", "reached"), [(9, 4.4), (6, 4.4), (5, 4.5), (1, 4.9)])
+def test_a_branch_ends_where_its_bound_is_met(monkeypatch, edges: int, reached: float) -> None:
+    monkeypatch.setattr(Need, "is_starved", lambda *_: False)
+    need = Need(price=1.0, most_starved=0.02, most_energy=4.45)
+    whole = Branching(5 - 0.1 * edges)
+    path = np.arange(edges, -1, -1)  # from the tip to the seam
+    assert _as_short_as_enough(Branching(5.0), path, whole, need).energy == pytest.approx(reached)
+
+
+def test_a_branch_that_only_pays_keeps_its_length(monkeypatch) -> None:
+    monkeypatch.setattr(Need, "is_starved", lambda *_: False)
+    need = Need(price=1.0, most_starved=0.02, most_energy=6.0)
+    whole = Branching(4.1)
+    assert _as_short_as_enough(Branching(5.0), np.arange(9, -1, -1), whole, need) is whole
