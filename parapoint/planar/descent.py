@@ -41,6 +41,7 @@ class Run:
         unit: sqrt(area).
         start: what it began with.
         branches: branches that the seam grew.
+        grown_from: the run before the last branch, and the branch's path of vertices to the seam.
         is_free: whether the boundary may cross itself; the map is then without flips, but perhaps
             not one to one.
         deadline: `time.monotonic()` after which no step begins.
@@ -51,6 +52,7 @@ class Run:
         self.unit = float(np.sqrt(mesh.face_areas.sum()))
         self.uv: FloatArray = np.zeros((0, 2))
         self.energy, self.start, self.branches = math.inf, "none", 0
+        self.grown_from: tuple[Run, IntArray] | None = None
 
     @property
     def is_late(self) -> bool:

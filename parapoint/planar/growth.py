@@ -10,7 +10,7 @@ from scipy.sparse import csgraph
 from parapoint.planar.descent import LEAST_ENERGY, Run
 from parapoint.surfaces.areas import MOST_STARVED, starved_faces, starved_share
 from parapoint.surfaces.cutting import edge_graph, edge_lengths, path_to
-from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
+from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh
 
 PRICE = 1.0
 """What the symmetric Dirichlet energy (4 at least) must fall by for each sqrt(area) of seam, unless
@@ -67,8 +67,9 @@ def grown(
 
     A branch stays where it pays, or where more seam is needed and it brings anything. Branches are
     sought on a free map, where one that fails costs a few steps; a map along them that is one to
-    one is then begun anew, and stays if they pay together. Where more seam is needed still,
-    branches of the map that is one to one open one by one, in many more steps.
+    one is then begun anew, and stays if they pay together. Where they bring the energy below its
+    bound, the last is made as short as that allows. Where more seam is needed still, branches of
+    the map that is one to one open one by one, in many more steps.
 
     Args:
         run: the map, settled; it is left as it is.
@@ -86,6 +87,9 @@ def grown(
         if not run.energy - longer.energy > need.least(run, added):
             break
         run = longer
+        shorter = _shortened(free, need)
+        if shorter is not free and (held := shorter.held(run.deadline)) and not need.of(held):
+            run = held
     return _led_on(run, need) if need.of(run) else run
 
 
@@ -122,23 +126,25 @@ def _longer(run: Run, need: Need) -> Run | None:
         path = np.array(path_to(previous, tip))
         longer = run.cut(path, run.energy - least)
         if longer is not None and run.energy - longer.energy > least:
-            return _as_short_as_enough(run, path, longer, need)
+            longer.grown_from = run, path
+            return longer
     return None
 
 
-def _as_short_as_enough(run: Run, path: IntArray, longer: Run, need: Need) -> Run:
-    """The run `longer` by a path, or by as little of it as brings the energy below its bound."""
-    if need.of(longer) or run.energy <= need.most_energy:
-        return longer
-    too_short, enough = 0, len(path) - 1  # edges, from the seam on
-    while enough - too_short > 1:
+def _shortened(run: Run, need: Need) -> Run:
+    """The run with as little of its last branch as keeps the energy below its bound."""
+    if run.grown_from is None or need.of(run):
+        return run
+    before, path = run.grown_from
+    shortest, too_short, enough = run, 0, len(path) - 1  # edges, from the seam on
+    while before.energy > need.most_energy and enough - too_short > 1:
         middle = (too_short + enough) // 2
-        shorter = run.cut(path[len(path) - 1 - middle :], need.most_energy)
+        shorter = before.cut(path[len(path) - 1 - middle :], need.most_energy)
         if shorter is None or need.of(shorter):
             too_short = middle
         else:
-            longer, enough = shorter, middle
-    return longer
+            shortest, enough = shorter, middle
+    return shortest
 
 
 def _rim(mesh: Mesh) -> float:

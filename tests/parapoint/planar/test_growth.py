@@ -6,7 +6,7 @@ import pytest
 from benchmarks.cases import builtin
 from benchmarks.metrics.evaluation import evaluate
 from parapoint.planar.descent import Run
-from parapoint.planar.growth import Need, _as_short_as_enough, grown
+from parapoint.planar.growth import Need, _shortened, grown
 from parapoint.surfaces.areas import MOST_STARVED, starved_share
 from parapoint.surfaces.parameterization import Parameterization
 
@@ -29,11 +29,13 @@ def test_a_seam_leads_to_what_is_starved() -> None:
 class Branching:
     """A run whose energy falls by 0.1 for each edge of a branch."""
 
-    def __init__(self, energy: float) -> None:
+    def __init__(self, energy: float, edges: int = 0) -> None:
         self.energy = energy
+        # The branch's path, from its tip to the seam.
+        self.grown_from = (Branching(5.0), np.arange(edges, -1, -1)) if edges else None
 
     def cut(self, path: np.ndarray, goal: float) -> "Branching":
-        assert path[-1] == 0  # where the seam is
+        assert path[-1] == 0
         assert goal == 4.45
         return Branching(5 - 0.1 * (len(path) - 1))
 
@@ -42,13 +44,12 @@ class Branching:
 def test_a_branch_ends_where_its_bound_is_met(monkeypatch, edges: int, reached: float) -> None:
     monkeypatch.setattr(Need, "is_starved", lambda *_: False)
     need = Need(price=1.0, most_starved=0.02, most_energy=4.45)
-    whole = Branching(5 - 0.1 * edges)
-    path = np.arange(edges, -1, -1)  # from the tip to the seam
-    assert _as_short_as_enough(Branching(5.0), path, whole, need).energy == pytest.approx(reached)
+    whole = Branching(5 - 0.1 * edges, edges)
+    assert _shortened(whole, need).energy == pytest.approx(reached)
 
 
 def test_a_branch_that_only_pays_keeps_its_length(monkeypatch) -> None:
     monkeypatch.setattr(Need, "is_starved", lambda *_: False)
     need = Need(price=1.0, most_starved=0.02, most_energy=6.0)
-    whole = Branching(4.1)
-    assert _as_short_as_enough(Branching(5.0), np.arange(9, -1, -1), whole, need) is whole
+    whole = Branching(4.1, 9)
+    assert _shortened(whole, need) is whole
