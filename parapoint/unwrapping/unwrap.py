@@ -17,13 +17,12 @@ from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
 from parapoint.parameters import check_choice, check_number
 from parapoint.planar.descent import LEAST_ENERGY, Run, sound
-from parapoint.planar.domains import FlatteningError
 from parapoint.planar.embedding import embeddable
 from parapoint.planar.growth import PRICE, grown
 from parapoint.planar.scaffold import of_area_one
 from parapoint.surfaces.across_seams import learned_seam
-from parapoint.surfaces.areas import MOST_STARVED, starved_share
-from parapoint.surfaces.cutting import cut_along, disk_cut, edge_lengths
+from parapoint.surfaces.areas import MOST_STARVED
+from parapoint.surfaces.cutting import cut_along, disk_cut
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.preparation import prepared
 from parapoint.surfaces.sampling import FEWEST_VERTICES
@@ -37,29 +36,26 @@ ENOUGH_POINTS = 6_000
 in 7 s, to 5.63 in 27 s."""
 STEPPING = 0.9
 """Share of a time budget after which no step begins: the last one takes time, too."""
-SHARE_UNCUT = 0.2
-"""Share of a time budget in which a map without a cut is sought."""
 LEAST_TIME = 0.01
 """Seconds that a part has at least, however little time is left."""
 SHARE_OF_SEAM = 0.5
-"""Share of the time left then in which the computed map, which tells the seam, is to be ready."""
+"""Share of a time budget in which the computed map, which tells the seam, is to be ready."""
 
 
 @dataclass(frozen=True)
 class Unwrap:
-    """An isometric map of the mesh, cut along the seams of the computed map; no flips, one to one.
+    """An isometric map of the mesh, cut along a clean path of edges; no flips, one to one.
 
-    `ComputedMap` maps the vertices; along its seam, made a clean path of edges
-    (`parapoint.surfaces.across_seams`), the mesh is cut. The symmetric Dirichlet energy is brought
-    down from Tutte's embedding, or from the computed map where that has less and is one to one on
-    the cut mesh; the boundary never crosses itself (`parapoint.planar.scaffold`). Then the seam
-    grows to where the map is most distorted (`parapoint.planar.growth`), as long as that pays, and
-    on until hardly a place is starved of area and a bound on the energy is met.
+    The symmetric Dirichlet energy is brought down from Tutte's embedding; the boundary never
+    crosses itself (`parapoint.planar.scaffold`). Then the seam grows to where the map is most
+    distorted (`parapoint.planar.growth`), as long as that pays, and on until hardly a place is
+    starved of area and a bound on the energy is met.
 
-    Where no map can be computed, the automatic cut (`parapoint.surfaces.cutting`) stands for it.
-
-    A disk, with or without holes, is cut only where that pays; where its map without a cut is so
-    good that none could, no map is computed. Components are mapped one after another.
+    A disk, with or without holes, begins without a seam, unless its map must come below a bound on
+    the energy: that takes long seams, which are sooner found. It is then cut, as any other mesh,
+    along the seam of `ComputedMap`, made a clean path of edges (`parapoint.surfaces.across_seams`),
+    or along the automatic cut (`parapoint.surfaces.cutting`) where no map can be computed.
+    Components are mapped one after another.
 
     Attributes:
         points: of the computed map; None for as many as show where the mesh should open.
@@ -141,40 +137,20 @@ class Unwrap:
         if not isinstance(surface, Mesh):
             raise UnsupportedError("needs faces; the surface is a point cloud")
         mesh = sound(surface)
-        seconds = self.time_budget
-        begun = time.monotonic()
-        deadline = math.inf if seconds is None else begun + STEPPING * seconds
-        whole = self._uncut(mesh, math.inf if seconds is None else begun + SHARE_UNCUT * seconds)
-        if whole is not None and self._needs_no_cut(whole, mesh):
-            self._keep_angles(whole)
-            report = {**whole.report(), "learned_seam_edges": 0, "computed": "no cut could pay"}
-            return Parameterization(whole.uv, whole.mesh.faces, report=report)
-        points = self.points or _enough_points(mesh)
-        left = max(deadline - time.monotonic(), LEAST_TIME)
-        budget = None if seconds is None else SHARE_OF_SEAM * left
-        computed: dict[str, object]
-        try:
-            learned = ComputedMap(points, distortion="conformal", time_budget=budget).parameterize(
-                mesh, seed=seed
-            )
-        except ReconstructionError as error:
-            computed = {"failed": str(error)}
-            seam = np.zeros(len(mesh.edges), dtype=bool)
-            if not mesh.is_planar_domain:
-                seam = disk_cut(mesh)
-            disk = cut_along(mesh, mesh.edges[seam])
-        else:
-            computed = dict(learned.report)
-            seam = learned_seam(mesh, learned.uv)
-            disk = cut_along(mesh, mesh.edges[seam])
-        run = Run(embeddable(disk), deadline)
-        run.begin()
-        run.improve()
-        if self.price is not None and self.distortion != "conformal":
-            if whole is not None and whole.energy <= run.energy + self.price * _length(mesh, seam):
-                run, seam = whole, np.zeros_like(seam)
-                run.deadline = deadline
-            run = grown(run, self.price, most_energy=self.max_distortion or np.inf)
+        deadline = math.inf
+        if self.time_budget is not None:
+            deadline = time.monotonic() + STEPPING * self.time_budget
+        grows = self.price is not None and self.distortion != "conformal"
+        most = self.max_distortion or math.inf
+        seam: BoolArray = np.zeros(len(mesh.edges), dtype=bool)
+        computed: dict[str, object] = {"not_asked": "the mesh is a disk, with or without holes"}
+        run = self._descended(mesh, seam, deadline) if grows and mesh.is_planar_domain else None
+        if run is None or run.energy > most:
+            seam, computed = self._seam(mesh, seed, deadline)
+            run = self._descended(mesh, seam, deadline)
+        if grows:
+            assert self.price is not None
+            run = grown(run, self.price, most_energy=most)
             run.improve()
         self._keep_angles(run)
         report = {
@@ -184,17 +160,29 @@ class Unwrap:
         }
         return Parameterization(run.uv, run.mesh.faces, report=report)
 
-    def _uncut(self, mesh: Mesh, deadline: float) -> Run | None:
-        """The map without a cut, where the mesh has one and the price may be too high."""
-        if self.price is None or not mesh.is_planar_domain:
-            return None
-        run = Run(mesh, deadline)
-        try:
-            run.begin()
-        except FlatteningError:
-            return None
+    def _descended(self, mesh: Mesh, seam: BoolArray, deadline: float) -> Run:
+        """The settled map of the mesh cut along some edges (E,), which make it a planar domain."""
+        run = Run(embeddable(cut_along(mesh, mesh.edges[seam])), deadline)
+        run.begin()
         run.improve()
         return run
+
+    def _seam(self, mesh: Mesh, seed: int, deadline: float) -> tuple[BoolArray, dict[str, object]]:
+        """(E,) the edges along the seam of the computed map, and the report of that map.
+
+        Where no map can be computed they are those of the automatic cut.
+        """
+        points = self.points or _enough_points(mesh)
+        budget = None
+        if self.time_budget is not None:
+            budget = SHARE_OF_SEAM * max(deadline - time.monotonic(), LEAST_TIME)
+        computed = ComputedMap(points, distortion="conformal", time_budget=budget)
+        try:
+            learned = computed.parameterize(mesh, seed=seed)
+        except ReconstructionError as error:
+            seam = np.zeros(len(mesh.edges), dtype=bool)
+            return seam if mesh.is_planar_domain else disk_cut(mesh), {"failed": str(error)}
+        return learned_seam(mesh, learned.uv), dict(learned.report)
 
     def _keep_angles(self, run: Run) -> None:
         """Move the map down the conformal energy as far as `distortion` says."""
@@ -204,19 +192,6 @@ class Unwrap:
         unit = of_area_one(run.mesh.vertices, run.mesh.faces)
         uv = towards_conformal(unit, run.uv / run.unit, run.deadline, most_starved)
         run.take(run.unit * uv, run.start)
-
-    def _needs_no_cut(self, whole: Run, mesh: Mesh) -> bool:
-        """Whether not even the shortest cut there is, one edge, could pay, nor a bound asks it."""
-        assert self.price is not None
-        least = self.price * float(edge_lengths(mesh).min() / np.sqrt(mesh.face_areas.sum()))
-        is_bounded = self.max_distortion is None or whole.energy <= self.max_distortion
-        is_fed = starved_share(whole.mesh, whole.uv) <= MOST_STARVED
-        return whole.energy - LEAST_ENERGY <= least and is_bounded and is_fed
-
-
-def _length(mesh: Mesh, seam: BoolArray) -> float:
-    """Length of the edges (E,) in sqrt(area)."""
-    return float(edge_lengths(mesh)[seam].sum() / np.sqrt(mesh.face_areas.sum()))
 
 
 def _enough_points(mesh: Mesh) -> int:

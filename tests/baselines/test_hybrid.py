@@ -20,6 +20,7 @@ from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.preparation import prepared
 from parapoint.surfaces.surface import Mesh
 from parapoint.testing import irregular_disk, sphere
+from parapoint.unwrapping.unwrap import ENOUGH_POINTS, POINTS_OF_A_FACE
 
 
 def torn(mesh, cut):
@@ -200,7 +201,7 @@ def test_the_artist_s_charts_are_kept_and_packed_apart():
     assert len(slit.uv) == len(disk.vertices)
 
 
-def test_parapoint_is_asked_only_where_a_cut_could_pay(monkeypatch):
+def test_a_seam_is_computed_only_where_a_mesh_has_to_be_opened(monkeypatch):
     asked = []
 
     def stop(self, *_, **__):
@@ -210,20 +211,24 @@ def test_parapoint_is_asked_only_where_a_cut_could_pay(monkeypatch):
     monkeypatch.setattr(ComputedMap, "parameterize", stop)
     bent, cap = irregular_disk(), builtin.sphere_cap(150, rings=5)
     flat = Mesh(bent.vertices * [1, 1, 0], bent.faces)
+    for mesh in (flat, cap):
+        made = registry.method("unwrap")[1].parameterize(mesh, seed=0)
+        assert made.report["learned_seam_edges"] == 0
     made = registry.method("unwrap")[1].parameterize(flat, seed=0)
-    assert made.report["learned_seam_edges"] == 0
     assert_allclose(made.report["end_energy"], 4, atol=1e-4)
     assert not asked
+    ball = builtin.sphere()
     for spec, mesh in (
-        ("unwrap", cap),
+        ("unwrap", builtin.torus(4)),
+        ("unwrap(points=150)", ball),
         ("unwrap(price=None)", flat),  # the learned seam, whatever it costs
-        ("unwrap(points=150)", cap),
-        ("unwrap", builtin.sphere_cap(150, rings=30)),
+        ("unwrap(distortion=conformal)", flat),  # angles, along the first seam
+        ("unwrap(max_distortion=4.01)", cap),  # a bound that its map without a seam misses
     ):
         with pytest.raises(InterruptedError):
             registry.method(spec)[1].parameterize(mesh, seed=0)
-    assert asked == [100 * len(cap.faces), 100 * len(flat.faces), 150, 20_000]
-    assert max(len(cap.faces), len(flat.faces)) < 200
+    few = [POINTS_OF_A_FACE * len(of.faces) for of in (builtin.torus(4), flat, flat, cap)]
+    assert asked == [min(few[0], ENOUGH_POINTS), 150, *(min(of, ENOUGH_POINTS) for of in few[1:])]
 
 
 def test_what_is_refused():

@@ -194,7 +194,8 @@ def test_a_map_that_is_to_keep_angles_keeps_them_better(bump, distortion) -> Non
     }
     off = {name: found["angle_difference_mean"] for name, found in made.items()}
     assert off[distortion] < 0.8 * off["isometric"]
-    assert made["isometric"]["symmetric_dirichlet"] < made[distortion]["symmetric_dirichlet"]
+    if distortion == "balanced":  # along the same seam; the conformal map has one of its own
+        assert made["isometric"]["symmetric_dirichlet"] < made[distortion]["symmetric_dirichlet"]
     for found in made.values():
         assert found["flipped_fraction"] == found["overlap_area"] == 0
     if distortion == "balanced":
