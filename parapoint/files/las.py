@@ -58,5 +58,6 @@ def las(data: bytes) -> Content:
     if all(name in columns and not columns[name].any() for name in ("red", "green", "blue")):
         for name in ("red", "green", "blue"):  # room for colours that were never taken
             del columns[name]
-    points = np.asarray(read.xyz, dtype=np.float64)[kept]
+    with np.errstate(over="ignore"):  # a coordinate that leaves the numbers is dropped, and counted
+        points = np.asarray(read.xyz, dtype=np.float64)[kept]
     return points_content(points, attributes=named_attributes(columns))

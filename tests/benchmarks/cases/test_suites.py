@@ -27,7 +27,18 @@ def test_cases_and_methods_exist(name):
 
 def test_the_suites():
     expected = {"smoke", "builtin", "paper", "disk", "closed", "genus", "cad", "wild", "scans"}
-    expected |= {"artist", "core", "ablation", "quality", "seeds", "noise", "cuts", "neural", "gpu"}
+    expected |= {
+        "artist",
+        "core",
+        "ablation",
+        "quality",
+        "seeds",
+        "noise",
+        "cuts",
+        "neural",
+        "gpu",
+        "bake",
+    }
     assert expected == set(SUITES)
     assert SUITES["builtin"].cases == tuple(BUILTIN)
     assert len(SUITES["paper"].cases) == 6
