@@ -144,6 +144,8 @@ def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
         raise InputError(f"{path}: {error}") from None
     except _DAMAGE as error:
         raise InputError(f"{path}: damaged ({error})") from None
+    if not all(isinstance(array, np.ndarray) for array in arrays.values()):
+        raise InputError(f"{path}: damaged (it holds what is no array)")
     found = {
         name: array.astype(np.int64) if array.dtype == np.int32 else array
         for name, array in arrays.items()
