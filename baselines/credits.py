@@ -29,6 +29,7 @@ class Credit(NamedTuple):
 CREDITS = {
     "tutte": Credit(LIBIGL, ("tutte1963", "libigl")),
     "harmonic": Credit(LIBIGL, ("pinkall1993", "eck1995", "libigl")),
+    "mean_value": Credit(OURS, ("floater2003",)),
     "lscm": Credit(LIBIGL, ("levy2002", "libigl")),
     "arap": Credit(LIBIGL, ("liu2008", "libigl")),
     "slim": Credit(LIBIGL, ("rabinovich2017", "libigl")),

@@ -31,6 +31,7 @@ from parapoint.method import REPAIRED, REQUIREMENTS, Method
 METHODS: dict[str, str] = {
     "tutte": "baselines.disks.tutte:Tutte",
     "harmonic": "baselines.disks.harmonic:Harmonic",
+    "mean_value": "baselines.disks.mean_value:MeanValue",
     "lscm": "baselines.disks.lscm:LSCM",
     "arap": "baselines.disks.arap:ARAP",
     "slim": "baselines.disks.slim:SLIM",

@@ -15,6 +15,7 @@ from parapoint.errors import InputError
 SECONDS_PER_10000_FACES: dict[str, float] = {
     "tutte": 0.012,
     "harmonic": 0.013,
+    "mean_value": 0.1,
     "lscm": 0.033,
     "bff": 0.04,
     "arap": 0.4,

@@ -25,6 +25,7 @@ from parapoint.testing import irregular_disk, sample_surfaces, sphere
 DISK_METHODS = [
     "tutte",
     "harmonic",
+    "mean_value",
     "lscm",
     "bff",
     "arap",

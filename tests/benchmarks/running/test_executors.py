@@ -83,7 +83,7 @@ def scheduler(tmp_path: Path):
     file = tmp_path / "scheduler.json"
     here = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(file)]
     start("distributed.cli.dask_scheduler", *here)
-    wait_until(file.exists)
+    wait_until(lambda: file.exists() and file.read_text())
     address = json.loads(file.read_text())["address"].removeprefix("tcp://")
 
     def worker(name: str) -> subprocess.Popen:

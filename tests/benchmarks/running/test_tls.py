@@ -47,7 +47,7 @@ def test_a_run_over_tls_gives_the_rows_of_a_local_one(tmp_path: Path) -> None:
     try:
         here = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--protocol", "tls"]
         start("distributed.cli.dask_scheduler", *here, "--scheduler-file", str(file))
-        wait_until(file.exists)
+        wait_until(lambda: file.exists() and file.read_text())
         address = json.loads(file.read_text())["address"]
         assert address.startswith("tls://")
         one = ["--no-nanny", "--nthreads", "1", "--no-dashboard", "--protocol", "tls"]
