@@ -32,7 +32,7 @@ class Boundary:
         self.reach = reach
 
     def barrier(self, uv: FloatArray) -> tuple[float, FloatArray]:
-        """The mean over edges of max(0, reach / distance - 1)² to near vertices; (V, 2) gradient."""
+        """The mean over edges of max(0, reach / distance - 1)² to near vertices; its gradient."""
         edges = shapely.linestrings(np.stack([uv[self.start], uv[self.end]], axis=1))
         tree = shapely.STRtree(np.asarray(shapely.points(uv[self.start])))
         edge, row = tree.query(edges, predicate="dwithin", distance=self.reach)
