@@ -33,6 +33,7 @@ CREDITS = {
     "lscm": Credit(LIBIGL, ("levy2002", "libigl")),
     "arap": Credit(LIBIGL, ("liu2008", "libigl")),
     "slim": Credit(LIBIGL, ("rabinovich2017", "libigl")),
+    "smith_schaefer": Credit(OURS, ("smith2015",)),
     "bff": Credit(LIBIGL, ("sawhney2017", "libigl")),
     "xatlas": Credit("MIT (xatlas)", ("xatlas", "sander2003")),
     "uvatlas": Credit("MIT (UVAtlas, by Open3D)", ("zhou2004",)),

@@ -35,6 +35,7 @@ METHODS: dict[str, str] = {
     "lscm": "baselines.disks.lscm:LSCM",
     "arap": "baselines.disks.arap:ARAP",
     "slim": "baselines.disks.slim:SLIM",
+    "smith_schaefer": "baselines.disks.smith_schaefer:SmithSchaefer",
     "bff": "baselines.disks.bff:BFF",
     "xatlas": "baselines.tools.xatlas_charts:Xatlas",
     "uvatlas": "baselines.tools.uvatlas:UVAtlas",

@@ -44,6 +44,7 @@ DISPLAY: dict[str, tuple[str, str]] = {
     "bff": ("BFF", "boundary first, conformal"),
     "arap": ("ARAP", "as-rigid-as-possible energy"),
     "slim": ("SLIM", ""),
+    "smith_schaefer": ("Smith and Schaefer", "symmetric Dirichlet, one to one"),
     "xatlas": ("xatlas", "many charts"),
     "uvunwrap": ("uvunwrap", "many charts"),
     "meshlab_lscm": ("MeshLab LSCM", "linear conformal energy"),

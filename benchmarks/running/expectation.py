@@ -20,6 +20,7 @@ SECONDS_PER_10000_FACES: dict[str, float] = {
     "bff": 0.04,
     "arap": 0.4,
     "slim": 0.9,
+    "smith_schaefer": 30.0,
     "xatlas": 0.9,
     "computed": 3.0,
     "unwrap": 30.0,
