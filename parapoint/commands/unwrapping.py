@@ -12,7 +12,7 @@ import click
 import numpy as np
 
 from parapoint.commands.mesh_output import MeshOutput
-from parapoint.commands.progress import Tell
+from parapoint.commands.progress import Tell, untold
 from parapoint.commands.telling import ADVICE_OF_MESHES, warn
 from parapoint.errors import InputError
 from parapoint.fitting import Progress
@@ -51,7 +51,9 @@ class Request:
     preview: Path | None = None
 
 
-def unwrap_mesh(mesh: Mesh, request: Request, output: MeshOutput, tell: Tell) -> dict[str, object]:
+def unwrap_mesh(
+    mesh: Mesh, request: Request, output: MeshOutput, tell: Tell = untold
+) -> dict[str, object]:
     """Unwrap a mesh and write it; the facts of what was done.
 
     Args:
