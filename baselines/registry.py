@@ -31,9 +31,12 @@ from parapoint.method import REPAIRED, REQUIREMENTS, Method
 METHODS: dict[str, str] = {
     "tutte": "baselines.disks.tutte:Tutte",
     "harmonic": "baselines.disks.harmonic:Harmonic",
+    "mean_value": "baselines.disks.mean_value:MeanValue",
     "lscm": "baselines.disks.lscm:LSCM",
     "arap": "baselines.disks.arap:ARAP",
     "slim": "baselines.disks.slim:SLIM",
+    "smith_schaefer": "baselines.disks.smith_schaefer:SmithSchaefer",
+    "geometry_image": "baselines.disks.geometry_image:GeometryImage",
     "bff": "baselines.disks.bff:BFF",
     "xatlas": "baselines.tools.xatlas_charts:Xatlas",
     "uvatlas": "baselines.tools.uvatlas:UVAtlas",

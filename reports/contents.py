@@ -39,10 +39,13 @@ POINT_COLLISIONS, POINT_TEARS = "uv_collision_fraction", "spanning_point_fractio
 DISPLAY: dict[str, tuple[str, str]] = {
     "tutte": ("Tutte", "uniform weights"),
     "harmonic": ("Harmonic", "cotangent weights"),
+    "mean_value": ("Mean value", "mean-value weights"),
     "lscm": ("LSCM", "linear conformal energy"),
     "bff": ("BFF", "boundary first, conformal"),
     "arap": ("ARAP", "as-rigid-as-possible energy"),
     "slim": ("SLIM", ""),
+    "smith_schaefer": ("Smith and Schaefer", "symmetric Dirichlet, one to one"),
+    "geometry_image": ("Geometry image", "least stretch on a square"),
     "xatlas": ("xatlas", "many charts"),
     "uvunwrap": ("uvunwrap", "many charts"),
     "meshlab_lscm": ("MeshLab LSCM", "linear conformal energy"),

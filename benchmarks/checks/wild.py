@@ -262,6 +262,46 @@ def writers() -> Iterator[Case]:
         yield Case(f"heading_{number}.xyz", text.encode(), shows(POINTS))
 
 
+def spellings() -> Iterator[Case]:
+    """Numbers as Fortran writes them; what Windows writes for no number, which is no point."""
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    rows = ["{} {} {}".format(*row) for row in square]
+    table = "\n".join(rows) + "\n"
+    obj = "".join(f"v {row}\n" for row in rows) + "f 1 2 3 4\n"
+    ply = "ply\nformat ascii 1.0\nelement vertex 4\n"
+    ply += "".join(f"property float {axis}\n" for axis in "xyz") + "end_header\n"
+    pcd = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 4\nDATA ascii\n"
+    texts = {".xyz": table, ".obj": obj, ".off": f"OFF\n4 1 0\n{table}4 0 1 2 3\n"}
+    texts |= {".ply": ply + table, ".pcd": pcd + table, ".pts": f"4\n{table}"}
+    for ending, text in texts.items():
+        yield Case(f"fortran{ending}", text.replace("1.0 ", "0.1D+01 ").encode(), shows(square))
+        for number, word in enumerate(("1.#QNAN", "-1.#IND00", "1.#INF", "-nan(ind)")):
+            data = text.replace("1.0 1.0 0.0", f"1.0 1.0 {word}").encode()
+            is_mesh = ending in {".obj", ".off"}
+            is_right = cannot_be_told if is_mesh else shows(square[[0, 1, 3]])
+            yield Case(f"windows_{number}{ending}", data, is_right, may_refuse=is_mesh)
+    ptx = f"2\n2\n{table}" + "1 0 0 0\n0 1 0 0\n0 0 1 0\n5 5 5 1\n" + table.replace("\n", " 0\n")
+    yield Case("ptx.xyz", ptx.encode(), cannot_be_told, may_refuse=True)
+    yield Case("ptx.pts", ptx.encode(), cannot_be_told, may_refuse=True)
+
+
+def stl() -> Iterator[Case]:
+    """Text STL: solids whose names hold words of the format, ends of lines, upper case."""
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    facets = "".join(
+        "facet normal 0 0 1\nouter loop\n"
+        + "".join("vertex {} {} {}\n".format(*row) for row in square[list(rows)])
+        + "endloop\nendfacet\n"
+        for rows in ((0, 1, 2), (0, 2, 3))
+    )
+    names = ("", "my part (2)", "facet normal 1 2 3", "vertex 9 9 9", "endsolid", "solid loop 1e3")
+    for number, name in enumerate(names):
+        text = f"solid {name}\n{facets}endsolid {name}\n"
+        for kind, end in (("unix", "\n"), ("dos", "\r\n"), ("mac", "\r")):
+            yield Case(f"{kind}_{number}.stl", text.replace("\n", end).encode(), shows(square))
+        yield Case(f"upper_{number}.stl", text.upper().encode(), shows(square))
+
+
 def _faces_up(path: Path, faces: int, area: float) -> bool:
     """Whether there are this many faces, with this total area, which all face upwards."""
     mesh, flat = read_parameterized(path)
@@ -302,6 +342,8 @@ FAMILIES: dict[str, Callable[[], Iterator[Case]]] = {
     "glTF": gltf,
     "writers": writers,
     "commas": commas,
+    "spellings": spellings,
+    "STL": stl,
     "marks": marks,
     "scan lines": wild_clouds.scan_lines,
     "PCD": wild_clouds.pcd,

@@ -117,6 +117,8 @@ def pcd() -> Iterator[Case]:
             data = (head + size + "DATA binary\n").encode()
             data += b"".join(struct.pack(kind, *row) for row in rows.tolist())
             yield Case(f"{name}_{ends}.pcd", data, shows(POINTS))
+            old = data.replace(b"FIELDS", b"COLUMNS", 1)  # its name before version 0.7
+            yield Case(f"{name}_{ends}_old.pcd", old, shows(POINTS))
 
 
 def las() -> Iterator[Case]:

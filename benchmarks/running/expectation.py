@@ -15,10 +15,12 @@ from parapoint.errors import InputError
 SECONDS_PER_10000_FACES: dict[str, float] = {
     "tutte": 0.012,
     "harmonic": 0.013,
+    "mean_value": 0.1,
     "lscm": 0.033,
     "bff": 0.04,
     "arap": 0.4,
     "slim": 0.9,
+    "smith_schaefer": 30.0,
     "xatlas": 0.9,
     "computed": 3.0,
     "unwrap": 30.0,

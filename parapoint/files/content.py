@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -15,6 +16,12 @@ from parapoint.surfaces.surface import FloatArray, IntArray
 
 NO_UV = np.iinfo(np.int64).min
 """Row of `Content.uv_corners` at a corner without UV."""
+NOT_A_NUMBER = re.compile(
+    rb"[+-]?\d\.#(?:INF|IND|QNAN|SNAN|IO|QO|J|R|T)\d*|[+-]?nan\([a-z]*\)", re.IGNORECASE
+)
+"""What programs of Windows write for what is infinite or no number: 1.#QNAN, -1.#IND, -nan(ind)."""
+FORTRAN_EXPONENT = re.compile(rb"[dD](?<=[\d.].)(?=[+-]?\d{1,3}(?![\w.]))")
+"""The letter in 1.5D+03, a double as Fortran writes it."""
 
 
 @dataclass
@@ -71,6 +78,13 @@ def whole(values: FloatArray | IntArray) -> IntArray:
     if not ((np.abs(values) < 2**53) & (np.floor(values) == values)).all():
         raise InputError("an index is no whole number")
     return values.astype(np.int64)
+
+
+def plain_numbers(text: bytes) -> bytes:
+    """The text with its numbers spelled as most programs spell them: nan, and e in exponents."""
+    if b".#" in text or b"(" in text:
+        text = NOT_A_NUMBER.sub(b"nan", text)
+    return FORTRAN_EXPONENT.sub(b"e", text)
 
 
 def word_counts(text: bytes, line_count: int) -> IntArray:

@@ -276,14 +276,21 @@ class Gltf:
         if placed.skin is None or "JOINTS_0" not in attributes:
             return np.asarray(local @ transform[:3, :3].T + transform[:3, 3])
         skin = self.tree["skins"][placed.skin]  # its joints move the vertices, and not the node
+        if outside := [joint for joint in skin["joints"] if joint not in self.world]:
+            raise InputError(f"has a skin whose joint {outside[0]} is not in the scene")
         joints = np.stack([self.world[joint] for joint in skin["joints"]])
         if "inverseBindMatrices" in skin:
             bound = self.accessor(skin["inverseBindMatrices"]).reshape(-1, 4, 4)
             joints = joints @ bound.transpose(0, 2, 1)
-        weight = self.accessor(attributes["WEIGHTS_0"])
-        blended = np.einsum(
-            "nj,njkl->nkl", weight, joints[whole(self.accessor(attributes["JOINTS_0"]))]
+        sets = range(sum(name.startswith("JOINTS_") for name in attributes))  # of four joints each
+        joint = np.concatenate([self.accessor(attributes[f"JOINTS_{k}"]) for k in sets], axis=1)
+        weight = np.concatenate([self.accessor(attributes[f"WEIGHTS_{k}"]) for k in sets], axis=1)
+        total = weight.sum(axis=1, keepdims=True)
+        # Viewers let weights sum to 1, and give a vertex without any to its first joint.
+        weight = np.divide(
+            weight, total, out=np.eye(1, weight.shape[1]) + 0 * weight, where=total > 0
         )
+        blended = np.einsum("nj,njkl->nkl", weight, joints[whole(joint)])
         moved = np.einsum("nkl,nl->nk", blended[:, :3, :3], local) + blended[:, :3, 3]
         return np.asarray(moved, dtype=np.float64)
 

@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from parapoint.errors import InputError
-from parapoint.files.content import NO_UV, Content, numbers, word_counts
+from parapoint.files.content import NO_UV, Content, numbers, plain_numbers, word_counts
 from parapoint.surfaces.surface import FloatArray, IntArray
 
 V, VT, F = (b"v ", b"v\t"), (b"vt ", b"vt\t"), (b"f ", b"f\t")
@@ -18,7 +18,8 @@ FREE_FORM = (b"surf ", b"surf\t", b"curv ", b"curv\t", b"curv2 ", b"curv2\t")
 
 def obj(data: bytes) -> Content:
     """Wavefront OBJ: v, vt, f, fo; negative indices, polygons, UV on some corners or all."""
-    text = re.sub(rb"#[^\r\n]*", b"", data) if b"#" in data else data
+    text = plain_numbers(data)
+    text = re.sub(rb"#[^\r\n]*", b"", text) if b"#" in text else text
     lines = [
         line.strip() for line in text.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines()
     ]

@@ -11,7 +11,7 @@ from itertools import chain
 import numpy as np
 
 from parapoint.errors import InputError
-from parapoint.files.content import Content, floats, integers, ranges
+from parapoint.files.content import Content, floats, integers, plain_numbers, ranges
 
 
 def off(data: bytes) -> Content:
@@ -19,7 +19,11 @@ def off(data: bytes) -> Content:
     first, _, body = data.partition(b"\n")
     if first.split()[1:2] == [b"BINARY"]:
         return _binary_off(body)
-    lines = [words for line in data.splitlines() if (words := line.split(b"#", 1)[0].split())]
+    lines = [
+        words
+        for line in plain_numbers(data).splitlines()
+        if (words := line.split(b"#", 1)[0].split())
+    ]
     if lines and lines[0][0].upper().endswith(b"OFF"):
         if lines[0][0].upper() not in {b"OFF", b"COFF", b"NOFF", b"CNOFF", b"STOFF"}:
             raise InputError(f"{lines[0][0][:20]!r} is no kind of OFF that has three coordinates")

@@ -95,7 +95,7 @@ def _pcd_header(
         at = end + 1
         if words and not words[0].startswith("#"):
             header[words[0].upper()] = words[1:]
-    fields = header["FIELDS"]
+    fields = header["FIELDS" if "FIELDS" in header else "COLUMNS"]  # its name before version 0.7
     codes = {"F": "f", "I": "i", "U": "u"}
     kinds = [
         np.dtype(f"<{codes[kind]}{int(size)}")

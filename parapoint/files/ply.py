@@ -16,7 +16,16 @@ import numpy.typing as npt
 
 from parapoint.errors import InputError
 from parapoint.files.attributes import GEOMETRY, named_attributes
-from parapoint.files.content import NO_UV, Content, floats, integers, ranges, strip_triangles, whole
+from parapoint.files.content import (
+    NO_UV,
+    Content,
+    floats,
+    integers,
+    plain_numbers,
+    ranges,
+    strip_triangles,
+    whole,
+)
 from parapoint.surfaces.surface import FloatArray, IntArray
 
 INDICES = {"vertex_indices", "vertex_index"}
@@ -179,7 +188,7 @@ def _parts(data: bytes) -> tuple[list[tuple[str, int, list[_Property]]], _Body]:
     end, body_begin = closing.span()
     encoding, elements = _ply_header(data[3:end].decode("latin-1").splitlines())
     raw = data[body_begin:]
-    body = _Body(raw, None if encoding else floats(raw.split(), 1).reshape(-1))
+    body = _Body(raw, None if encoding else floats(plain_numbers(raw).split(), 1).reshape(-1))
     return elements, body
 
 

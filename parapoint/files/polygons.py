@@ -59,17 +59,11 @@ def triangle_rows(vertices: FloatArray, sizes: IntArray, corners: IntArray) -> I
         polygons = np.flatnonzero(sizes == n)
         rings = vertices[corners[starts[polygons, None] + np.arange(n)]] / scale
         folded, planes = _folded(rings)
-        for polygon, plane in zip(polygons[folded].tolist(), planes, strict=True):
-            steps += _steps(plane)
-            if n > MOST_CORNERS or steps > MOST_STEPS:
-                raise InputError(
-                    f"face {polygon} has {n} corners, too many to be cut into triangles here"
-                    + ("" if n > MOST_CORNERS else ", since it touches or crosses itself")
-                    + "; cut it before"
-                )
-            if (cut := ears(plane)) is not None:
-                first = first_row[polygon]
-                rows[first : first + n - 2] = starts[polygon] + cut
+        polygons = polygons[folded]
+        steps += _refuse_large(polygons, planes, steps)
+        cut, triangles = ears(planes)
+        places = first_row[polygons[cut], None] + np.arange(n - 2)
+        rows[places] = starts[polygons[cut], None, None] + triangles
     return rows
 
 
@@ -107,55 +101,72 @@ def _folded(rings: FloatArray) -> tuple[BoolArray, FloatArray]:
     return folded, planes
 
 
-def _steps(plane: FloatArray) -> float:
-    """About how many steps it takes to cut a polygon (n, 2)."""
-    count = len(plane)
-    if count <= FEW_CORNERS or count > MOST_CORNERS:
-        return float(count) ** 2
-    if shapely.is_simple(shapely.linearrings(plane)):
-        return float(count) ** 2
-    return float(count) ** 3
+def _refuse_large(polygons: IntArray, planes: FloatArray, steps: float) -> float:
+    """About how many steps it takes to cut these polygons (N, n, 2), after `steps` for others."""
+    count = planes.shape[1]
+    taken = np.full(len(planes), float(count) ** 2)
+    if FEW_CORNERS < count <= MOST_CORNERS:
+        taken[~shapely.is_simple(shapely.linearrings(planes))] *= count
+    too_many = (steps + np.cumsum(taken) > MOST_STEPS) | (count > MOST_CORNERS)
+    if too_many.any():
+        raise InputError(
+            f"face {polygons[too_many][0]} has {count} corners, too many to be cut into triangles "
+            "here"
+            + ("" if count > MOST_CORNERS else ", since it touches or crosses itself")
+            + "; cut it before"
+        )
+    return float(taken.sum())
 
 
-def ears(plane: FloatArray) -> IntArray | None:
-    """(n - 2, 3) rows of a polygon (n, 2) as triangles that turn as it does.
+def ears(planes: FloatArray) -> tuple[BoolArray, IntArray]:
+    """(N,) the polygons (N, n, 2) that a cut fills, and these as (M, n - 2, 3) rows of triangles.
 
-    None where no cut fills the polygon: it crosses itself.
+    The triangles turn as their polygon does. One that crosses itself may not be filled.
     """
-    found = mapbox_earcut.triangulate_float64(plane, np.array([len(plane)], dtype=np.uint32))
-    triangles = _with_all_corners(np.asarray(found, dtype=np.int64).reshape(-1, 3), len(plane))
-    if len(triangles) != len(plane) - 2:
-        return None
-    a, b, c = plane[triangles].transpose(1, 0, 2)
-    turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
+    number, count = planes.shape[:2]
+    hole = np.array([count], dtype=np.uint32)
+    found = [mapbox_earcut.triangulate_float64(plane, hole) for plane in planes]
+    lengths = np.array([len(triangles) // 3 for triangles in found], dtype=np.int64)
+    used = np.zeros((number, count), dtype=bool)
+    if number:
+        used[np.repeat(np.arange(number), 3 * lengths), np.concatenate(found)] = True
+    left_out = count - used.sum(axis=1)
+    triangles = np.zeros((number, count - 2, 3), dtype=np.int64)
+    cut = (lengths == count - 2) & (left_out == 0)
+    if cut.any():
+        chosen = [found[polygon] for polygon in np.flatnonzero(cut).tolist()]
+        triangles[cut] = np.concatenate(chosen).reshape(-1, count - 2, 3)[:, ::-1]
+    fillable = (left_out > 0) & (lengths + left_out >= count - 2)
+    for polygon in np.flatnonzero(fillable).tolist():
+        filled = _with_all_corners(found[polygon].reshape(-1, 3).tolist(), count)
+        cut[polygon] = len(filled) == count - 2
+        if cut[polygon]:
+            triangles[polygon] = filled
+    triangles = triangles[cut]
+    a, b, c = np.moveaxis(planes[np.flatnonzero(cut)[:, None, None], triangles], 2, 0)
+    turned = (b - a)[..., 0] * (c - a)[..., 1] - (b - a)[..., 1] * (c - a)[..., 0] < 0
     triangles[turned] = triangles[turned][:, ::-1]
-    return triangles
+    return cut, triangles
 
 
-def _with_all_corners(triangles: IntArray, count: int) -> IntArray:
-    """The triangles (T, 3) of a ring, with the corners inside straight edges that earcut drops.
+def _with_all_corners(triangles: list[list[int]], count: int) -> list[list[int]]:
+    """The triangles of a ring, with the corners inside straight edges that earcut drops.
 
     A triangle at such an edge becomes a fan over the corners on it.
     """
-    cut: list[tuple[int, int, int]] = []
-    kept = np.unique(triangles)
-    if len(kept) == count:
-        return triangles[::-1]
-    following = dict(zip(kept.tolist(), np.roll(kept, -1).tolist(), strict=True))
-    waiting = [(int(a), int(b), int(c)) for a, b, c in triangles]
-    while waiting:
-        triangle = waiting.pop()
-        for k in range(3):
-            a, b, c = triangle[k], triangle[(k + 1) % 3], triangle[(k + 2) % 3]
-            p, q = (a, b) if following.get(a) == b else (b, a)
-            if following.get(p) != q or (q - p) % count <= 1:
-                continue
-            steps = [(p + step) % count for step in range((q - p) % count + 1)]
-            fan = list(pairwise(steps))
-            del following[p]
-            following |= dict(fan)
-            waiting += [(i, j, c) for i, j in fan]
-            break
+    kept = sorted({corner for triangle in triangles for corner in triangle})
+    following = zip(kept, [*kept[1:], *kept[:1]], strict=True)
+    gaps = {p: q for p, q in following if (q - p) % count > 1}
+    cut: list[list[int]] = []
+    waiting = triangles
+    while waiting and gaps:
+        a, b, c = waiting.pop()
+        for p, q, opposite in (a, b, c), (b, a, c), (b, c, a), (c, b, a), (c, a, b), (a, c, b):
+            if gaps.get(p) == q:
+                del gaps[p]
+                steps = [(p + step) % count for step in range((q - p) % count + 1)]
+                waiting += [[i, j, opposite] for i, j in pairwise(steps)]
+                break
         else:
-            cut.append(triangle)
-    return np.array(cut, dtype=np.int64).reshape(-1, 3)
+            cut.append([a, b, c])
+    return cut + waiting[::-1]

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from parapoint.errors import InputError
 from parapoint.files.attributes import colours_of
-from parapoint.files.content import Content, points_content
+from parapoint.files.content import Content, plain_numbers, points_content
 from parapoint.surfaces.surface import FloatArray
 
 logger = logging.getLogger("parapoint")
@@ -49,6 +49,7 @@ def text_lines(data: bytes) -> list[bytes]:
     Raises:
         InputError: commas part numbers or mark decimals, and it cannot be told which.
     """
+    data = plain_numbers(data)
     lines = [
         line
         for line in data.translate(None, b'"').replace(b";", b" ").splitlines()
@@ -109,9 +110,11 @@ def point_lines(data: bytes) -> tuple[list[bytes], list[str]]:
     Left out are a heading, a line of units below it, and the counts before each scan.
 
     Raises:
-        InputError: there is no point; see `text_lines`.
+        InputError: there is no point, or it is PTX; see `text_lines`.
     """
-    lines = [line for line in text_lines(data) if not line.strip().isdigit()]
+    lines = text_lines(data)
+    _refuse_ptx(lines)
+    lines = [line for line in lines if not line.strip().isdigit()]
     comment = data.lstrip().split(b"\n", 1)[0]
     heading = comment if comment.startswith((b"#", b"//")) else b""
     for _ in range(2):
@@ -121,6 +124,15 @@ def point_lines(data: bytes) -> tuple[list[bytes], list[str]]:
     if not lines:
         raise InputError("has no point")
     return lines, _names(heading)
+
+
+def _refuse_ptx(lines: list[bytes]) -> None:
+    """Refuse Leica's PTX, where the pose of a scan in ten lines would be read as points."""
+    words = [line.split() for line in lines[:10]]
+    if [len(line) for line in words] == [1, 1, 3, 3, 3, 3, 4, 4, 4, 4] and all(
+        line[0].isdigit() for line in words[:2]
+    ):
+        raise InputError("is PTX, whose scans have places of their own; export it as PTS or PLY")
 
 
 def _is_number(word: bytes) -> bool:
@@ -212,6 +224,7 @@ def pts(data: bytes) -> Content:
     marked = [line for line in lines if line.startswith(b"p ")]
     if marked:
         return points_content(table(marked, (1, 2, 3)))
+    _refuse_ptx(lines)
     counts = [at for at, line in enumerate(lines) if line.strip().isdigit()]
     if counts[:1] == [0]:
         for at, after in zip(counts, [*counts[1:], len(lines)], strict=True):

@@ -59,7 +59,7 @@ def simplified(mesh: Mesh) -> tuple[Mesh, IntArray] | None:
 
     None where the simplified mesh is another kind of surface, or has faces without area.
     """
-    moved, faces, _, vertex = igl.qslim(
+    _, faces, _, vertex = igl.qslim(
         np.asfortranarray(mesh.vertices), np.asfortranarray(mesh.faces.astype(np.int32)), COARSE
     )
     coarse = Mesh(mesh.vertices[vertex], faces)

@@ -73,3 +73,9 @@ def test_closed_models_are_cut_to_disks_that_tutte_embeds(name):
     (disk,) = preparation.parts
     assert disk.topology == "disk"
     assert method.parameterize(disk, seed=0).report == {"flipped": 0, "degenerate": 0}
+
+
+@pytest.mark.parametrize("name", ["hand_1_i_f5000", "three_man_statue_i_f10000", "mannequin-devil"])
+def test_mean_value_flips_no_triangle_of_a_model_with_limbs(name):
+    result = registry.method("mean_value")[1].parameterize(model(name), seed=0)
+    assert result.report == {"flipped": 0, "degenerate": 0}

@@ -34,3 +34,32 @@ def test_a_large_polygon_is_cut():
     assert (doubled > 0).all()
     x, y, _ = ring.T
     assert_allclose(doubled.sum(), (x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
+
+
+def test_polygons_are_cut_together_as_each_alone():
+    draw = np.random.default_rng(0)
+    sizes = draw.integers(3, 12, size=300)
+    rings = [draw.integers(0, 4, size=(size, 3)).astype(float) for size in sizes]  # many cross
+    for n in range(0, 300, 2):  # half of them are stars, some with corners inside straight edges
+        angle = np.sort(draw.random(sizes[n])) * 2 * np.pi
+        radius = draw.integers(1, 3, size=sizes[n])
+        rings[n] = np.round(np.stack([3 * radius * np.cos(angle), 3 * radius * np.sin(angle)], 1))
+        rings[n] = np.insert(rings[n], 2, 1.0, axis=1)
+    starts = np.cumsum(sizes) - sizes
+    together = triangle_rows(np.concatenate(rings), sizes, np.arange(sizes.sum()))
+    alone = [
+        start + triangle_rows(ring, np.array([len(ring)]), np.arange(len(ring)))
+        for start, ring in zip(starts, rings, strict=True)
+    ]
+    assert (together == np.concatenate(alone)).all()
+
+
+def test_corners_inside_straight_edges_keep_their_triangles():
+    # Earcut leaves such corners out; each must be part of a triangle that turns as the polygon.
+    ring = np.array([[0, 0], [1, 0], [2, 0], [4, 0], [4, 4], [2, 1], [0, 4], [0, 3], [0, 1.0]])
+    rows = triangle_rows(np.insert(ring, 2, 0.0, axis=1), np.array([9]), np.arange(9))
+    a, b, c = ring[rows].transpose(1, 0, 2)
+    doubled = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    assert set(rows.ravel().tolist()) == set(range(9))
+    assert (doubled >= 0).all()
+    assert_allclose(doubled.sum() / 2, 10.0)

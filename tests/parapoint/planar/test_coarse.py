@@ -30,7 +30,8 @@ def test_a_simplified_mesh_has_vertices_of_the_large_one(few) -> None:
     assert (simple.vertices == mesh.vertices[vertex]).all()
 
 
-def test_the_seam_grows_to_where_that_of_the_simplified_mesh_did(few) -> None:
+@pytest.mark.usefixtures("few")
+def test_the_seam_grows_to_where_that_of_the_simplified_mesh_did() -> None:
     mesh = builtin.finger()
     run = Run(mesh)
     run.begin()

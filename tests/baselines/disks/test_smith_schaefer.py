@@ -1,0 +1,127 @@
+"""Smith and Schaefer's map: its energy, its barrier, its steps, and what the barrier changes."""
+
+from collections import deque
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from baselines.disks.barrier_energy import Boundary, Energy, turning_points
+from baselines.disks.quasi_newton import direction
+from baselines.disks.slim import SLIM
+from baselines.disks.smith_schaefer import SmithSchaefer
+from parapoint.errors import InputError
+from parapoint.planar.crossing import crossing_vertices
+from parapoint.planar.domains import domain, signed_areas
+from parapoint.planar.tutte import tutte
+from parapoint.surfaces.surface import Mesh
+from parapoint.testing import irregular_disk
+
+
+def ramp():
+    """One and a quarter turns of a ramp around a pillar, almost flat: laid flat it meets itself."""
+    turn, radius = (of.ravel() for of in np.meshgrid(np.linspace(0, 7.8, 27), [0.5, 1, 1.5, 2]))
+    points = np.stack([radius * np.cos(turn), radius * np.sin(turn), 0.02 * turn], axis=1)
+    corner = (np.arange(3)[:, None] * 27 + np.arange(26)).ravel()
+    faces = np.concatenate([corner[:, None] + side for side in ([0, 28, 1], [0, 27, 28])])
+    return Mesh(points, faces)
+
+
+def numeric_gradient(function, uv, step=1e-6):
+    slope = np.zeros_like(uv)
+    for at in np.ndindex(uv.shape):
+        move = np.zeros_like(uv)
+        move[at] = step
+        slope[at] = (function(uv + move) - function(uv - move)) / (2 * step)
+    return slope
+
+
+def test_the_gradients_of_energy_and_barrier_are_their_differences():
+    disk = domain(irregular_disk())
+    uv = tutte(disk)
+    energy = Energy(disk, 0.7)  # far enough that vertices near and past the ends of edges count
+    assert energy.boundary.barrier(uv)[0] > 0
+    slope = energy.of(uv)[1]
+    assert_allclose(slope, numeric_gradient(lambda x: energy.of(x)[0], uv), atol=1e-6)
+
+
+def test_the_energy_by_hand():
+    mesh = Mesh(np.array([[0, 0, 0], [1, 0, 0], [0, 1.0, 0]]), np.array([[0, 1, 2]]))
+    distortion = Energy(domain(mesh), 1e-9).of(mesh.vertices[:, :2] * [2, 1])[2]
+    assert distortion == pytest.approx(4 + 1 + 1 / 4 + 1)
+    assert Energy(domain(mesh), 1e-9).of(mesh.vertices[:, :2] * [-2, 1])[2] == np.inf
+
+
+def test_the_barrier_by_hand():
+    # The far corner is at a distance of 1/2 from the edge of length 1, the others at sqrt(1/2).
+    mesh = Mesh(np.array([[0, 0, 0], [1, 0, 0], [0.5, 0.5, 0]]), np.array([[0, 1, 2]]))
+    boundary = Boundary(domain(mesh), 0.6)
+    assert boundary.barrier(mesh.vertices[:, :2])[0] == pytest.approx(0.2**2 / 3)
+
+
+def test_a_triangle_turns_over_where_the_root_says():
+    corners = np.array([[[0, 0]], [[1, 0]], [[0, 1.0]]])
+    move = np.array([[[0, 0]], [[0, 0]], [[0, -4.0]]])
+    assert min(turning_points(corners, move))[0] == pytest.approx(0.25)
+    grow = np.array([[[0, 0]], [[1, 0]], [[0, 1.0]]])
+    assert np.isinf(min(turning_points(corners, grow))[0])
+
+
+def test_a_step_ends_where_a_vertex_meets_an_edge():
+    """Two triangles that hang together at the right, their tips moved towards one another."""
+    points = np.array([[0, 1, 0], [2, 1, 0], [2, -1, 0], [0, -1, 0], [3, 0, 0.0], [1.2, 0.2, 0]])
+    faces = np.array([[0, 5, 1], [1, 5, 4], [5, 2, 4], [5, 3, 2]])
+    disk = domain(Mesh(points, faces))
+    uv, move = points[:, :2], np.zeros((6, 2))
+    move[3, 1] = 10
+    boundary = Boundary(disk, 0.1)
+    step = boundary.largest_step(uv, move, 1.0)
+    assert 0 < step < 1
+    mesh = Mesh(points, faces)
+    assert not len(crossing_vertices(mesh, uv + 0.999 * step * move))
+    assert len(crossing_vertices(mesh, uv + 1.001 * step * move))
+    assert boundary.largest_step(uv, -move, 1.0) == 1.0
+
+
+def test_the_remembered_steps_are_newton_s_on_a_quadratic():
+    hessian = np.diag([1.0, 10.0, 100.0, 1000.0])
+    x, pairs = np.ones((2, 2)), deque(maxlen=8)
+    slope = (hessian @ x.ravel()).reshape(2, 2)
+    for _ in range(12):
+        move = direction(slope, pairs)
+        step = -(move * slope).sum() / (move.ravel() @ hessian @ move.ravel())
+        ahead = (hessian @ (x + step * move).ravel()).reshape(2, 2)
+        pairs.append((step * move, ahead - slope))
+        x, slope = x + step * move, ahead
+    assert np.abs(x).max() < 1e-6
+
+
+def test_the_boundary_that_slim_lays_over_itself_stays_apart():
+    mesh = ramp()
+    assert len(crossing_vertices(mesh, SLIM(iterations=200).parameterize(mesh, seed=0).uv))
+    result = SmithSchaefer().parameterize(mesh, seed=0)
+    assert result.report["bijective"]
+    assert not len(crossing_vertices(mesh, result.uv))
+    assert (signed_areas(result.uv, mesh.faces) > 0).all()
+
+
+def test_every_step_of_the_trace_is_one_to_one_and_lowers_the_energy():
+    mesh = irregular_disk()
+    result = SmithSchaefer(iterations=60).parameterize(mesh, seed=0)
+    values = [point.values["symmetric_dirichlet"] for point in result.trace]
+    assert values[-1] < values[0] - 0.5
+    assert [point.iteration for point in result.trace] == list(range(len(values)))
+    assert values[-1] == result.report["end_energy"]
+    assert_array_equal(result.trace[-1].uv, result.uv)
+    for point in result.trace:
+        if point.uv is not None:
+            assert (signed_areas(point.uv, mesh.faces) > 0).all()
+            assert not len(crossing_vertices(mesh, point.uv))
+
+
+def test_a_descent_ends_at_its_time():
+    result = SmithSchaefer(time_budget=1e-9).parameterize(irregular_disk(), seed=0)
+    assert result.report["iterations"] == 0
+    assert not SmithSchaefer(time_budget=1.0).deterministic
+    with pytest.raises(InputError, match="time_budget must be a number above 0"):
+        SmithSchaefer(time_budget=0.0)
