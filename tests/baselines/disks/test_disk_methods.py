@@ -31,6 +31,7 @@ DISK_METHODS = [
     "bff",
     "arap",
     "smith_schaefer",
+    "geometry_image(side=9)",
     "slim",
     "slim(energy=conformal)",
     "slim(energy=log_arap)",
