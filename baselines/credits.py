@@ -34,6 +34,7 @@ CREDITS = {
     "arap": Credit(LIBIGL, ("liu2008", "libigl")),
     "slim": Credit(LIBIGL, ("rabinovich2017", "libigl")),
     "smith_schaefer": Credit(OURS, ("smith2015",)),
+    "geometry_image": Credit(LIBIGL, ("gu2002", "yoshizawa2004", "libigl")),
     "bff": Credit(LIBIGL, ("sawhney2017", "libigl")),
     "xatlas": Credit("MIT (xatlas)", ("xatlas", "sander2003")),
     "uvatlas": Credit("MIT (UVAtlas, by Open3D)", ("zhou2004",)),

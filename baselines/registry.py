@@ -36,6 +36,7 @@ METHODS: dict[str, str] = {
     "arap": "baselines.disks.arap:ARAP",
     "slim": "baselines.disks.slim:SLIM",
     "smith_schaefer": "baselines.disks.smith_schaefer:SmithSchaefer",
+    "geometry_image": "baselines.disks.geometry_image:GeometryImage",
     "bff": "baselines.disks.bff:BFF",
     "xatlas": "baselines.tools.xatlas_charts:Xatlas",
     "uvatlas": "baselines.tools.uvatlas:UVAtlas",

@@ -14,7 +14,9 @@ from parapoint import __version__, console
 @click.version_option(__version__, prog_name="parapoint")
 def parapoint() -> None:
     """UV maps of point clouds and meshes."""
-    logging.basicConfig(format="%(message)s")
+    # The handler of last resort asks for sys.stderr at each line, which a progress bar replaces.
+    assert logging.lastResort is not None
+    logging.basicConfig(format="%(message)s", handlers=[logging.lastResort])
 
 
 for name, place, summary in (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+import time
 from dataclasses import asdict, is_dataclass
 from typing import Any, cast
 
@@ -17,6 +18,7 @@ from parapoint.surfaces.preparation import prepared
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, PointCloud, Surface
 
 SEED = 7
+"""Seed of the methods and of the surfaces that they are checked on."""
 SIMILARITIES = ((5e5, 1e-6), (6e6, 1e6))
 """Shifts, in sizes of the surface, and scales of the similar surfaces that are tried."""
 STRAY = 1e6
@@ -26,7 +28,6 @@ ALIKE = 1e-3
 OTHER_SEEDS = (1, 2, 3)
 SEEDS_APART = 2.0
 """Factor on the range of the measures over a few seeds, since other seeds may differ by more."""
-"""Seed of the methods and of the surfaces that they are checked on."""
 THINNEST = 1e-9
 """Ratio of a map's width to its length up to which it counts as collapsed to a line."""
 
@@ -49,7 +50,8 @@ def check_method(method: Method, surface: Surface | None = None) -> None:
     - A similar surface, far from the origin and in another unit, or with a far vertex that belongs
       to no face, has a map alike: what the map
       does to lengths and areas differs by ALIKE at most, or by what seeds make it differ.
-    - A trace counts up in steps and seconds, and its maps are finite and of the result's shape.
+    - A trace counts up in steps and seconds, these from the start of the method, and its maps are
+      finite and of the result's shape.
 
     Args:
         method: what is checked.
@@ -196,7 +198,9 @@ def _check_run(
 ) -> Parameterization | PointParameterization:
     """The map of a surface that the method admits, checked."""
     before = _arrays(surface)
+    begun = time.perf_counter()
     result = method.parameterize(surface, seed=SEED)
+    seconds = time.perf_counter() - begun
     for name, array in _arrays(surface).items():
         _promise(np.array_equal(array, before[name]), f"{where}: changed the surface's {name}")
     if isinstance(surface, Mesh):
@@ -218,7 +222,7 @@ def _check_run(
     spread = np.linalg.svd(result.uv - result.uv.mean(axis=0), compute_uv=False)
     wide = bool(spread[1] > THINNEST * spread[0])
     _promise(wide, f"{where}: the map collapsed to a line or a point")
-    _check_trace(result, where)
+    _check_trace(result, seconds, where)
     _check_json(dict(result.report), f"{where}: the report")
     return result
 
@@ -249,13 +253,17 @@ def _check_corners(mesh: Mesh, result: Parameterization, where: str) -> None:
     )
 
 
-def _check_trace(result: Parameterization | PointParameterization, where: str) -> None:
-    """The trace counts up, and its maps fit the result."""
+def _check_trace(
+    result: Parameterization | PointParameterization, seconds: float, where: str
+) -> None:
+    """The trace counts up within the seconds that the method took, and its maps fit the result."""
     for name, values in (
         ("iterations", [point.iteration for point in result.trace]),
         ("seconds", [point.seconds for point in result.trace]),
     ):
         _promise(values == sorted(values), f"{where}: the {name} of the trace go back")
+    within = all(0 <= point.seconds <= seconds for point in result.trace)
+    _promise(within, f"{where}: the seconds of the trace are not those since the method began")
     for point in result.trace:
         if point.uv is not None:
             fits = point.uv.shape == result.uv.shape and np.isfinite(point.uv).all()

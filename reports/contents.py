@@ -45,6 +45,7 @@ DISPLAY: dict[str, tuple[str, str]] = {
     "arap": ("ARAP", "as-rigid-as-possible energy"),
     "slim": ("SLIM", ""),
     "smith_schaefer": ("Smith and Schaefer", "symmetric Dirichlet, one to one"),
+    "geometry_image": ("Geometry image", "least stretch on a square"),
     "xatlas": ("xatlas", "many charts"),
     "uvunwrap": ("uvunwrap", "many charts"),
     "meshlab_lscm": ("MeshLab LSCM", "linear conformal energy"),

@@ -12,7 +12,7 @@ from scipy.sparse.linalg import splu
 from parapoint.planar.domains import Domain, check_triangles, circle, closed_holes, domain, scaled
 from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.parameterization import Parameterization
-from parapoint.surfaces.surface import FloatArray, Surface
+from parapoint.surfaces.surface import FloatArray, IntArray, Surface
 
 
 @dataclass(frozen=True)
@@ -52,15 +52,19 @@ class MeanValue:
 
 def embedded(disk: Domain, boundary: FloatArray) -> FloatArray:
     """(V, 2) the mean-value embedding with the domain's loop at `boundary` (B, 2)."""
-    weights = mean_value_weights(disk)
+    return balanced(mean_value_weights(disk), disk.loop, boundary)[: len(disk.vertices)]
+
+
+def balanced(weights: sparse.csr_array, loop: IntArray, boundary: FloatArray) -> FloatArray:
+    """(V, 2) each vertex at the weighted mean of its neighbours, the `loop` (B,) at `boundary`."""
     size = weights.shape[0]
     matrix = (sparse.identity(size) - sparse.diags_array(1 / weights.sum(axis=1)) @ weights).tocsr()
-    inside = np.setdiff1d(np.arange(size), disk.loop)
+    inside = np.setdiff1d(np.arange(size), loop)
     uv: FloatArray = np.zeros((size, 2))
-    uv[disk.loop] = boundary
+    uv[loop] = boundary
     rows = matrix[inside]
-    uv[inside] = splu(rows[:, inside].tocsc()).solve(-(rows[:, disk.loop] @ boundary))
-    return uv[: len(disk.vertices)]
+    uv[inside] = splu(rows[:, inside].tocsc()).solve(-(rows[:, loop] @ boundary))
+    return uv
 
 
 def mean_value_weights(disk: Domain) -> sparse.csr_array:

@@ -149,7 +149,6 @@ def is_minimum(
     if name == "exp_conformal":
         density = densities(corners)
         share = weight * np.exp(density - density.max())
-        share = share / share.sum()
     nudge = NUDGE * float(np.ptp(uv, axis=0).max()) / len(faces) ** 0.5
     slope = np.zeros_like(uv)
     for corner, axis in np.ndindex(3, 2):

@@ -9,10 +9,12 @@ import click
 
 from parapoint.commands.memory import memory_option
 from parapoint.commands.output import TEXTURE
+from parapoint.commands.progress import baking, bar
 from parapoint.errors import InputError
 from parapoint.files.png import png
 from parapoint.files.reading import faults_of, read_parameterized, read_surface
 from parapoint.files.targets import checked_picture, complete_file, sealed_png
+from parapoint.fitting import Progress
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.surface import Mesh, PointCloud
 from parapoint.textures.baking import (
@@ -58,14 +60,17 @@ def bake(
         raise InputError(f"--map must be one of {', '.join(MAPS)}, not {kind!r}")
     check_size(texture, margin)
     path = checked_picture(out, inputs=[model, cloud], force=force)
-    points = _points(cloud, kind)
-    charted = _charted(model)
-    with faults_of(Path(cloud)):
-        check_together(charted, points)
-    made = baked(charted, points, kind, texture, margin)
-    data = sealed_png(png(made.pixels, made.text))
-    with complete_file(path) as file:
-        file.write(data)
+    with bar() as tell:
+        tell(Progress("reading"))
+        points = _points(cloud, kind)
+        charted = _charted(model)
+        with faults_of(Path(cloud)):
+            check_together(charted, points)
+        made = baked(charted, points, kind, texture, margin, done=baking(tell))
+        tell(Progress("writing"))
+        data = sealed_png(png(made.pixels, made.text))
+        with complete_file(path) as file:
+            file.write(data)
     facts = {"file": out, "map": kind, "points": len(points.points), "texture": texture}
     facts |= {"texture_fill": round(made.fill, 3), **made.text}
     if as_json:

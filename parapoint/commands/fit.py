@@ -10,9 +10,17 @@ from typing import Any
 import click
 
 from parapoint import saving
-from parapoint.commands.fitting import estimator_of, fitted, summary
+from parapoint.commands.fitting import estimator_of, fitted
 from parapoint.commands.memory import memory_option
+from parapoint.commands.output import TEXTURE
+from parapoint.commands.progress import bar
+from parapoint.commands.telling import ADVICE_OF_CLOUDS, lines, warn
+from parapoint.errors import InputError
 from parapoint.files.reading import read_surface
+from parapoint.files.targets import checked_target
+from parapoint.fitting import Progress
+from parapoint.textures.placing import Placing
+from parapoint.unwrapping.quality import quality
 
 logger = logging.getLogger("parapoint")
 
@@ -49,17 +57,40 @@ def fit(surface: str, out: str, preset: str, as_json: bool, **settings: Any) -> 
     The state of a training is saved in DIR each minute: the same command goes on after a kill.
     """
     model = estimator_of(preset, settings)
-    for stem in ("model", "checkpoint"):
-        saving.check_free(Path(out), stem)
-    given = read_surface(surface)
+    _check_folder(Path(out))
     try:
-        model = fitted(surface, given, model, checkpoint=out)
+        with bar() as tell:
+            tell(Progress("reading"))
+            given = read_surface(surface)
+            model = fitted(surface, given, model, tell, checkpoint=out)
+            tell(Progress("writing"))
+            model.save(out)
+            tell(Progress("measuring"))
+            charted = model.mesh()
+            found = quality(Placing.smallest(charted.map.uv).of(charted), TEXTURE)
     except KeyboardInterrupt:
         logger.warning("%s", _how_to_go_on(out))
         raise
-    model.save(out)
-    report = {"model": out, "estimator": type(model).__name__, **model.report_}
-    print(json.dumps(report) if as_json else f"{out}: {summary(model)}")
+    facts = {"file": out, "faces": len(charted.mesh.faces), **found.facts(), **model.report_}
+    warn(facts, ADVICE_OF_CLOUDS)
+    if as_json:
+        print(json.dumps({"model": out, "estimator": type(model).__name__, **facts}))
+    else:
+        print(lines(facts))
+
+
+def _check_folder(folder: Path) -> None:
+    """Check that the folder of a model can be made and written to.
+
+    Raises:
+        InputError: it cannot, or something that is not ours is in the way.
+    """
+    for stem in ("model", "checkpoint"):
+        saving.check_free(folder, stem)
+    there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not there.is_dir():
+        raise InputError(f"{there}: is a file; name a folder")
+    checked_target(there / "model.json", force=True)
 
 
 def _how_to_go_on(out: str) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from parapoint.commands.progress import bar
+from parapoint.commands.progress import Tell
 from parapoint.errors import InputError
 from parapoint.estimator import Estimator
 from parapoint.surfaces.surface import Surface
@@ -25,7 +25,8 @@ def estimator_of(preset: str, settings: dict[str, Any]) -> Estimator:
     """The estimator of a preset; settings that are None were not given.
 
     Raises:
-        InputError: there is no such preset, or it does not use a setting that was given.
+        InputError: there is no such preset, or it does not use a setting that was given, or a
+            setting is out of range.
     """
     given = {name: value for name, value in settings.items() if value is not None}
     if preset not in PRESETS:
@@ -39,16 +40,19 @@ def estimator_of(preset: str, settings: dict[str, Any]) -> Estimator:
             raise InputError(
                 f"{option} is not used by --preset computed; --preset learned and paper take it"
             )
-        return ComputedMap(**given)
-    from parapoint.learned.parapoint import ParaPoint
+        model: Estimator = ComputedMap(**given)
+    else:
+        from parapoint.learned.parapoint import ParaPoint
 
-    return ParaPoint(preset, **given)
+        model = ParaPoint(preset, **given)
+    model.check()
+    return model
 
 
 def fitted(
-    path: str, surface: Surface, model: Estimator, *, checkpoint: str | None = None
+    path: str, surface: Surface, model: Estimator, tell: Tell, *, checkpoint: str | None = None
 ) -> Estimator:
-    """The model fitted to a surface under a progress bar.
+    """The model fitted to a surface.
 
     Where no map can be computed, ParaPoint is trained in its place, and a warning says so.
 
@@ -56,6 +60,7 @@ def fitted(
         path: the file of the surface, for messages.
         surface: what is fitted.
         model: an estimator.
+        tell: is called with each `Progress`.
         checkpoint: folder of the state of a training, or None.
 
     Raises:
@@ -63,33 +68,24 @@ def fitted(
     """
     from parapoint.computed.reconstruction import ReconstructionError
 
+    def fit(estimator: Estimator) -> Estimator:
+        return estimator.fit(surface, checkpoint=checkpoint, callback=tell)
+
     try:
-        with bar() as advance:
+        try:
+            return fit(model)
+        except ReconstructionError as error:
+            from parapoint.learned.parapoint import ParaPoint
 
-            def fit(estimator: Estimator) -> Estimator:
-                return estimator.fit(surface, checkpoint=checkpoint, callback=advance)
-
-            try:
-                return fit(model)
-            except ReconstructionError as error:
-                from parapoint.learned.parapoint import ParaPoint
-
-                logger.warning("no map could be computed, so one is trained: %s", error)
-                stand_in = ParaPoint(
-                    "learned",
-                    time_budget=model.time_budget or FALLBACK_SECONDS,
-                    components=model.components,
-                    seed=model.seed,
-                )
-                return fit(stand_in)
+            logger.warning("no map could be computed, so one is trained: %s", error)
+            stand_in = ParaPoint(
+                "learned",
+                time_budget=model.time_budget or FALLBACK_SECONDS,
+                components=model.components,
+                seed=model.seed,
+            )
+            return fit(stand_in)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     except RuntimeError as error:  # the training diverged
         raise click.ClickException(f"{path}: {error}") from error
-
-
-def summary(model: Estimator) -> str:
-    """What was done, in a few words."""
-    report = model.report_
-    steps = f"{report['iterations']} iterations" if "iterations" in report else "computed"
-    return f"{steps} in {report['seconds']} s"

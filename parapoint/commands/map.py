@@ -8,7 +8,10 @@ import click
 
 from parapoint.commands.memory import memory_option
 from parapoint.commands.output import target, write
+from parapoint.commands.progress import bar
+from parapoint.commands.telling import ADVICE_OF_MAPS, lines, warn
 from parapoint.files.reading import read_surface
+from parapoint.fitting import Progress
 
 
 @click.command("map", no_args_is_help=True, options_metavar="[OPTIONS] --out FILE")
@@ -31,10 +34,14 @@ def map_(model: str, surface: str, out: str, device: str, *, force: bool, as_jso
     out = target(out, surface, force=force, textured=False)
     from parapoint.estimator import load
 
-    facts = write(load(model, device=device), read_surface(surface), out)
+    with bar() as tell:
+        tell(Progress("reading"))
+        loaded, given = load(model, device=device), read_surface(surface)
+        facts = write(loaded, given, out, tell=tell)
+    warn(facts, ADVICE_OF_MAPS)
     if as_json:
         print(json.dumps(facts))
         return
-    print(f"{out}: {facts['mapped_points']} points mapped")
+    print(lines(facts))
     if count := facts.get("unmapped_points"):
         print(f"{count} points lie far from the surface: rows {facts['unmapped_rows']} come first")

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from parapoint.commands.output import SIDES, TEXTURE
+from parapoint.commands.progress import Tell, baking, untold
 from parapoint.files.gltf_rewriting import check_rewritable, rewrite_gltf
 from parapoint.files.mesh_writers import (
     write_material,
@@ -100,13 +101,14 @@ class MeshOutput:
             with faults_of(self.source):
                 check_rewritable(self.source)
 
-    def picture(self, placed: Charted) -> Picture:
+    def picture(self, placed: Charted, tell: Tell = untold) -> Picture:
         """What the texture shows: what the file does, or a checkerboard."""
+        done = baking(tell)
         if self.painting is not None:
             chosen = self.painting if self.chosen is None else self.painting.of_faces(self.chosen)
-            return repainted(placed, chosen, self.texture, self.margin)
+            return repainted(placed, chosen, self.texture, self.margin, done=done)
         if self.given.colours is not None and self.chosen is None:
-            return coloured(placed, self.given.colours, self.texture, self.margin)
+            return coloured(placed, self.given.colours, self.texture, self.margin, done=done)
         return checkerboard(CHECKER_FIELDS, max(1, self.texture // CHECKER_FIELDS))
 
     def write(self, placed: Charted, picture: Picture) -> dict[str, object]:

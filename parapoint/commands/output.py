@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import logging
+import time
 from pathlib import Path
 
 import numpy as np
 
+from parapoint.commands.progress import Tell, baking, untold
 from parapoint.errors import InputError
 from parapoint.estimator import Estimator
 from parapoint.files.mesh_writers import write_npz, write_ply, write_textured
 from parapoint.files.point_writers import write_points
 from parapoint.files.targets import beside, checked_picture, checked_target
+from parapoint.fitting import Progress
 from parapoint.surfaces.across_seams import Transform, edges_across_seam, opened
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.sampling import mean_spacing
@@ -73,6 +76,7 @@ def write(
     texture: int | None = None,
     margin: int | None = None,
     preview: Path | None = None,
+    tell: Tell = untold,
 ) -> dict[str, object]:
     """Map a surface into the unit square and write it; what was written, as facts.
 
@@ -84,7 +88,10 @@ def write(
         texture: texels along a side of a texture, or None; .glb has one always.
         margin: texels around the map and its charts; 1 / 256 of the side if None.
         preview: a PNG file for a picture of the surface beside its layout, or None.
+        tell: is called with each `Progress`.
     """
+    begun = time.perf_counter()
+    tell(Progress("mapping"))
     ending = Path(out).suffix.lower()
     size = texture or TEXTURE
     charted = model.mesh()
@@ -116,13 +123,16 @@ def write(
         facts |= {"faces": len(charted.mesh.faces), "texture": size}
         pixels = checkerboard(pixels=max(1, size // 32))
         if "colours" in surface.attributes:
-            made = baked(shown, surface, "colour", size, MARGIN if margin is None else margin)
+            texels = MARGIN if margin is None else margin
+            made = baked(shown, surface, "colour", size, texels, done=baking(tell))
             pixels = made.pixels.astype(np.uint8, copy=False)
             facts["texture_fill"] = round(made.fill, 3)
         write_textured(out, shown, pixels)
+    tell(Progress("writing"))
     if preview is not None:
         write_preview(preview, shown, pixels)
-    return {"faces": len(shown.mesh.faces)} | facts | quality(shown, size).facts()
+    facts = {"faces": len(shown.mesh.faces)} | facts | quality(shown, size).facts()
+    return facts | {"seconds": round(time.perf_counter() - begun, 3)}
 
 
 def _warn_of_far(out: str, is_far: BoolArray) -> None:

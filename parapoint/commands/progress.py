@@ -1,9 +1,10 @@
-"""The progress of a fit on standard error: a bar on a terminal, nothing elsewhere."""
+"""The progress of a command on standard error: a bar on a terminal, nothing elsewhere."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from time import monotonic
 
 from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
@@ -11,10 +12,27 @@ from rich.progress import Progress as Bar
 from parapoint.console import terminal
 from parapoint.fitting import Progress
 
+Tell = Callable[[Progress], None]
+"""What a part of a command calls to say how far it is."""
+
+
+def untold(_: Progress) -> None:
+    """What is called where nobody looks."""
+
+
+def baking(tell: Tell) -> Callable[[float], None]:
+    """What a bake calls with the share that is done, from 0 to 1."""
+    tell(Progress("baking"))
+    return lambda share: tell(Progress("baking", share))
+
 
 @contextmanager
-def bar() -> Iterator[Callable[[Progress], None]]:
-    """Gives the callback that moves the bar."""
+def bar() -> Iterator[Tell]:
+    """Gives the callback that moves the bar.
+
+    Log lines and warnings stand above it: while it is there, rich takes what goes to standard
+    error. Where a phase tells its share but not its end, the end is reckoned from its start.
+    """
     shown = terminal(stderr=True)
     columns = (
         TextColumn("{task.description}"),
@@ -26,16 +44,22 @@ def bar() -> Iterator[Callable[[Progress], None]]:
     with Bar(*columns, console=shown, disable=not shown.is_terminal) as progress:
         # While nobody can tell the end, as while a map is computed, the bar pulses.
         task = progress.add_task("start", total=None, loss="", remaining="")
+        phase, begun = "", 0.0
 
         def advance(now: Progress) -> None:
-            remaining = "" if now.remaining is None else f"{now.remaining:.0f} s left"
-            total = None if now.fraction is None else 1.0
+            nonlocal phase, begun
+            if now.phase != phase:
+                phase, begun = now.phase, monotonic()
+                progress.update(task, loss="")
+            remaining = now.remaining
+            if remaining is None and now.fraction:
+                remaining = (monotonic() - begun) * (1 - now.fraction) / now.fraction
             progress.update(
                 task,
                 completed=now.fraction or 0.0,
-                total=total,
+                total=None if now.fraction is None else 1.0,
                 description=now.phase,
-                remaining=remaining,
+                remaining="" if remaining is None else f"{remaining:.0f} s left",
             )
             if now.losses:
                 progress.update(task, loss=f"loss {now.losses['total']:.4f}")

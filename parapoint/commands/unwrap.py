@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import time
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import click
@@ -10,11 +13,20 @@ import click
 from parapoint.commands.fitting import estimator_of, fitted
 from parapoint.commands.memory import memory_option
 from parapoint.commands.output import TEXTURE, preview_target, target, write
-from parapoint.commands.telling import lines
+from parapoint.commands.progress import Tell, bar
+from parapoint.commands.telling import ADVICE_OF_CLOUDS, Facts, lines, warn
 from parapoint.errors import InputError
 from parapoint.files.reading import Polygons, read_polygons
-from parapoint.parameters import check_choice
+from parapoint.fitting import Progress
+from parapoint.parameters import (
+    LARGEST_SEED,
+    LONGEST_SECONDS,
+    check_choice,
+    check_number,
+    check_whole,
+)
 from parapoint.surfaces.components import COMPONENTS, components, largest_component
+from parapoint.surfaces.surface import PointCloud
 from parapoint.textures.baking import MARGIN, check_size
 from parapoint.textures.placing import BORDER
 
@@ -60,12 +72,7 @@ def unwrap(
     preview: str | None,
     force: bool,
     as_json: bool,
-    seams: str | None,
-    per_vertex: bool,
-    distortion: str | None,
-    seam_price: float | None,
-    max_distortion: float | None,
-    **settings: Any,
+    **options: Any,
 ) -> None:
     """Lay a mesh or a point cloud out in the unit square.
 
@@ -73,8 +80,8 @@ def unwrap(
     file written as OBJ keeps all its lines but for the UVs; without materials of its own it gets a
     checkerboard. Components are mapped one by one; with --components largest only that one is
     written. Branches of the seam grow where each lowers the energy (symmetric Dirichlet, 4 at
-    least) by --seam-price (1) for a length of the square root of the area; --max-distortion adds
-    to them until the energy is as low, within --time-budget.
+    least) by --seam-price (1) for a length of the square root of the area; or, with
+    --max-distortion, until the energy is as low and no longer, within --time-budget.
 
     --distortion isometric keeps angles and areas alike; balanced keeps angles as far as every part
     keeps its area; conformal keeps angles alone, whatever becomes of an ear or a finger.
@@ -85,55 +92,118 @@ def unwrap(
     out = target(out, surface, force=force, textured=texture is not None)
     check_size(TEXTURE if texture is None else texture, margin or 0)
     picture = None if preview is None else preview_target(preview, out, surface, force=force)
-    given = read_polygons(surface)
-    border = BORDER if margin is None else margin / (texture or TEXTURE)
-    if isinstance(given, Polygons):
-        from parapoint.commands.mesh_output import mesh_output
-        from parapoint.commands.unwrapping import Request, unwrap_mesh
-        from parapoint.unwrapping.unwrap import Unwrap
-
-        check_choice("components", settings["components"], COMPONENTS)
-        grown: dict[str, object] = {
-            "--seam-price": seam_price,
-            "--max-distortion": max_distortion,
-            "--distortion": distortion,
-        }
-        grown["--components largest"] = settings["components"] == "largest" or None
-        for option, given_value in grown.items():
-            if seams is not None and given_value is not None:
-                raise InputError(f"{option} does not go with --seams, which are cut as they are")
-        if seam_price is not None and distortion == "conformal":
-            raise InputError("--seam-price does not go with --distortion conformal")
-        method = Unwrap(
-            time_budget=settings["time_budget"],
-            price=Unwrap.price if seam_price is None else seam_price,
-            max_distortion=max_distortion,
-            distortion=distortion or Unwrap.distortion,
-        )
-        mesh, chosen = given.mesh, None
-        if settings["components"] == "largest" and mesh.component_count > 1:
-            mesh, chosen = largest_component(mesh)
-        output = mesh_output(
-            given,
-            surface,
-            out,
-            texture,
-            MARGIN if margin is None else margin,
-            chosen=chosen,
-            per_vertex=per_vertex,
-        )
-        output.check(force=force)
-        request = Request(method, border, settings["seed"], seams, picture)
-        facts = unwrap_mesh(mesh, request, output)
-        print(json.dumps(facts) if as_json else lines(facts))
-        return
-    unused = {"--seams": seams, "--seam-price": seam_price, "--max-distortion": max_distortion}
-    for option, value in {**unused, "--per-vertex": per_vertex or None}.items():
-        if value is not None:
-            raise InputError(f"{option} is for meshes; {surface} is a point cloud")
-    settings["distortion"] = distortion
-    model = fitted(surface, given, estimator_of("computed", settings))
-    written = components(given)[0] if model.components == "largest" else given
-    facts = write(model, written, out, texture=texture, margin=margin, preview=picture)
-    facts |= model.report_
+    asked = Asked(surface, out, texture, margin, picture, force, **options)
+    with bar() as tell:
+        tell(Progress("reading"))
+        given = read_polygons(surface)
+        if isinstance(given, Polygons):
+            facts = _unwrap_mesh(given, asked, tell)
+        else:
+            facts = _unwrap_cloud(given, asked, tell)
     print(json.dumps(facts) if as_json else lines(facts))
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The options of `unwrap`, as its help has them.
+
+    Attributes:
+        preview: the file for the picture, checked, or None.
+    """
+
+    surface: str
+    out: str
+    texture: int | None
+    margin: int | None
+    preview: Path | None
+    force: bool
+    time_budget: float | None
+    components: str
+    seed: int
+    distortion: str | None
+    seam_price: float | None
+    max_distortion: float | None
+    seams: str | None
+    per_vertex: bool
+
+    def __post_init__(self) -> None:
+        check_choice("components", self.components, COMPONENTS)
+        check_whole("seed", self.seed, 0, LARGEST_SEED)
+        if self.time_budget is not None:
+            check_number("time_budget", self.time_budget, most=LONGEST_SECONDS, above=True)
+        unused: dict[str, object] = {
+            "--seam-price": self.seam_price,
+            "--max-distortion": self.max_distortion,
+            "--distortion": self.distortion,
+            "--components largest": self.components == "largest" or None,
+        }
+        for option, value in unused.items():
+            if self.seams is not None and value is not None:
+                raise InputError(f"{option} does not go with --seams, which are cut as they are")
+        if self.seam_price is not None and self.max_distortion is not None:
+            raise InputError(
+                "--seam-price does not go with --max-distortion, which alone says how far to cut"
+            )
+        if self.seam_price is not None and self.distortion == "conformal":
+            raise InputError("--seam-price does not go with --distortion conformal")
+
+
+def _unwrap_mesh(given: Polygons, asked: Asked, tell: Tell) -> Facts:
+    """Unwrap a mesh; what was done, as facts."""
+    from parapoint.commands.mesh_output import mesh_output
+    from parapoint.commands.unwrapping import Request, unwrap_mesh
+    from parapoint.unwrapping.unwrap import Unwrap
+
+    method = Unwrap(
+        time_budget=asked.time_budget,
+        price=Unwrap.price if asked.seam_price is None else asked.seam_price,
+        max_distortion=asked.max_distortion,
+        distortion=asked.distortion or Unwrap.distortion,
+    )
+    mesh, chosen = given.mesh, None
+    if asked.components == "largest" and mesh.component_count > 1:
+        mesh, chosen = largest_component(mesh)
+    output = mesh_output(
+        given,
+        asked.surface,
+        asked.out,
+        asked.texture,
+        MARGIN if asked.margin is None else asked.margin,
+        chosen=chosen,
+        per_vertex=asked.per_vertex,
+    )
+    output.check(force=asked.force)
+    border = BORDER if asked.margin is None else asked.margin / (asked.texture or TEXTURE)
+    request = Request(method, border, asked.seed, asked.seams, asked.preview)
+    return unwrap_mesh(mesh, request, output, tell)
+
+
+def _unwrap_cloud(given: PointCloud, asked: Asked, tell: Tell) -> Facts:
+    """Unwrap a cloud; what was done, as facts."""
+    begun = time.perf_counter()
+    for_meshes = {
+        "--seams": asked.seams,
+        "--seam-price": asked.seam_price,
+        "--max-distortion": asked.max_distortion,
+        "--per-vertex": asked.per_vertex or None,
+    }
+    for option, value in for_meshes.items():
+        if value is not None:
+            raise InputError(f"{option} is for meshes; {asked.surface} is a point cloud")
+    names = ("time_budget", "components", "seed", "distortion")
+    computed = estimator_of("computed", {name: getattr(asked, name) for name in names})
+    model = fitted(asked.surface, given, computed, tell)
+    written = components(given)[0] if model.components == "largest" else given
+    facts = write(
+        model,
+        written,
+        asked.out,
+        texture=asked.texture,
+        margin=asked.margin,
+        preview=asked.preview,
+        tell=tell,
+    )
+    facts |= model.report_
+    facts["seconds"] = round(time.perf_counter() - begun, 3)
+    warn(facts, ADVICE_OF_CLOUDS)
+    return facts

@@ -12,18 +12,18 @@ import click
 import numpy as np
 
 from parapoint.commands.mesh_output import MeshOutput
-from parapoint.commands.progress import bar
+from parapoint.commands.progress import Tell, untold
+from parapoint.commands.telling import ADVICE_OF_MESHES, warn
 from parapoint.errors import InputError
 from parapoint.fitting import Progress
 from parapoint.method import UnsupportedError
 from parapoint.planar.domains import FlatteningError
-from parapoint.surfaces.areas import MOST_STARVED
 from parapoint.surfaces.parameterization import Charted, Parameterization
 from parapoint.surfaces.surface import IntArray, Mesh
 from parapoint.textures.packing import packed
 from parapoint.textures.preview import write_preview
 from parapoint.unwrapping.given import unwrapped_along
-from parapoint.unwrapping.quality import Quality, quality
+from parapoint.unwrapping.quality import quality
 from parapoint.unwrapping.unwrap import Unwrap
 
 logger = logging.getLogger("parapoint")
@@ -51,40 +51,46 @@ class Request:
     preview: Path | None = None
 
 
-def unwrap_mesh(mesh: Mesh, request: Request, output: MeshOutput) -> dict[str, object]:
+def unwrap_mesh(
+    mesh: Mesh, request: Request, output: MeshOutput, tell: Tell = untold
+) -> dict[str, object]:
     """Unwrap a mesh and write it; the facts of what was done.
+
+    Args:
+        mesh: what is unwrapped.
+        request: how.
+        output: what is written.
+        tell: is called with each `Progress`.
 
     Raises:
         InputError: the mesh cannot be unwrapped, or a seam is none of its edges.
         click.ClickException: no map without flips was found.
     """
     began = time.perf_counter()
-    with bar() as advance:
-        seconds = request.method.time_budget
-        at_most = "" if seconds is None else f" (at most {seconds:g} s)"
-        advance(Progress(f"unwrapping{at_most}"))
-        made = _made(mesh, request, output)
-        advance(Progress("packing"))
-        placed = packed(Charted(mesh, made), request.border)
-        advance(Progress("baking"))
-        picture = output.picture(placed)
-        advance(Progress("writing"))
-        written = output.write(placed, picture)
-        if request.preview is not None:
-            is_y_up = output.source.suffix.lower() in Y_UP
-            write_preview(request.preview, placed, picture[..., :3], is_y_up=is_y_up)
-        advance(Progress("measuring"))
-        found = quality(placed, output.texture)
+    seconds = request.method.time_budget
+    at_most = "" if seconds is None else f" (at most {seconds:g} s)"
+    tell(Progress(f"cutting and flattening{at_most}"))
+    made = _made(mesh, request, output)
+    tell(Progress("packing"))
+    placed = packed(Charted(mesh, made), request.border)
+    picture = output.picture(placed, tell)
+    tell(Progress("writing"))
+    written = output.write(placed, picture)
+    if request.preview is not None:
+        is_y_up = output.source.suffix.lower() in Y_UP
+        write_preview(request.preview, placed, picture[..., :3], is_y_up=is_y_up)
+    tell(Progress("measuring"))
+    found = quality(placed, output.texture)
     facts: dict[str, object] = {"file": str(output.out), "faces": len(mesh.faces), **found.facts()}
+    if "duplicate" in str(made.report.get("steps", "")):
+        facts["overlap"] = "unknown"  # a face that was left out may lie on another
     parts = [part for part in _parts(made) if "end_energy" in part]
-    facts["overlap"] = "none" if all(part["bijective"] for part in parts) else "some"
-    if found.flipped or "duplicate" in str(made.report.get("steps", "")):
-        facts["overlap"] = "unknown"  # a face that was turned or left out may lie on another
     facts["energy"] = round(max(float(str(part["end_energy"])) for part in parts), 4)
     facts["components"] = mesh.component_count
     facts |= written
     facts["seconds"] = round(time.perf_counter() - began, 1)
-    _warn(found, facts, request, output)
+    _warn_of_bound(facts, request)
+    warn(facts, ADVICE_OF_MESHES)
     return facts
 
 
@@ -137,28 +143,13 @@ def _parts(made: Parameterization) -> list[dict[str, object]]:
     return parts
 
 
-def _warn(found: Quality, facts: dict[str, object], request: Request, output: MeshOutput) -> None:
-    """A line of advice for each bound that is passed."""
+def _warn_of_bound(facts: dict[str, object], request: Request) -> None:
+    """A line of advice where the energy is above what was asked for."""
     bound = request.method.max_distortion
     if bound is not None and float(str(facts["energy"])) > bound:
         logger.warning(
             "%s: the energy is %s, above --max-distortion %g: give more time, or a higher bound",
-            output.out,
+            facts["file"],
             facts["energy"],
             bound,
-        )
-    if found.flipped or facts["overlap"] != "none":
-        logger.warning(
-            "%s: %d faces are flipped, overlap: %s; faces without area or a defective mesh can be "
-            "the cause: clean it, or crop it",
-            output.out,
-            found.flipped,
-            facts["overlap"],
-        )
-    if found.starved > MOST_STARVED:
-        logger.warning(
-            "%s: %.1f %% of the surface has less than a quarter of its fair area: a longer seam "
-            "helps, as with --seam-price 0.03",
-            output.out,
-            100 * found.starved,
         )

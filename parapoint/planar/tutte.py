@@ -17,8 +17,6 @@ def tutte(disk: Domain) -> FloatArray:
     if (signed_areas(uv, disk.faces) > 0).all():
         return uv
     vertices, faces = closed_holes(disk)
-    if len(vertices) == len(disk.vertices):
-        return uv
     return scaled(disk, _embedded(disk, vertices, faces)[: len(disk.vertices)])
 
 

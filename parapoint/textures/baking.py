@@ -109,7 +109,23 @@ def check_together(charted: Charted, cloud: PointCloud) -> None:
         )
 
 
-def baked(charted: Charted, cloud: PointCloud, kind: str, size: int, margin: int = MARGIN) -> Baked:
+Done = Callable[[float], None]
+"""Is called with the share of a bake that is done, from 0 to 1."""
+
+
+def unwatched(_: float) -> None:
+    """What is called where nobody wants to know."""
+
+
+def baked(
+    charted: Charted,
+    cloud: PointCloud,
+    kind: str,
+    size: int,
+    margin: int = MARGIN,
+    *,
+    done: Done = unwatched,
+) -> Baked:
     """The texture of a mesh with what is known at the points of a cloud of the same surface.
 
     "colour" is 8-bit sRGB as the cloud has it. "normal" is an 8-bit tangent-space normal map as
@@ -124,6 +140,7 @@ def baked(charted: Charted, cloud: PointCloud, kind: str, size: int, margin: int
         kind: one of MAPS.
         size: texels along a side.
         margin: texels around each chart that repeat its edge.
+        done: is called on the way.
 
     Raises:
         InputError: the cloud has not what the map shows; the map leaves the unit square.
@@ -133,29 +150,29 @@ def baked(charted: Charted, cloud: PointCloud, kind: str, size: int, margin: int
     shown = texels(charted, size)
     return {"colour": _colour, "normal": _normal, "position": _position, "intensity": _intensity}[
         kind
-    ](shown, cloud, margin)
+    ](shown, cloud, margin, done)
 
 
-def _colour(shown: Texels, cloud: PointCloud, margin: int) -> Baked:
+def _colour(shown: Texels, cloud: PointCloud, margin: int, done: Done) -> Baked:
     colours = Scattered(cloud.points, unit_colours(cloud.attributes["colours"][:, :3]))
-    flat = painted(shown, 3, np.uint8, lambda at, _: 255 * colours(at))
+    flat = painted(shown, 3, np.uint8, lambda at, _: 255 * colours(at), done)
     return Baked(dilated(flat, shown, margin), {}, _fill(shown))
 
 
-def _intensity(shown: Texels, cloud: PointCloud, margin: int) -> Baked:
+def _intensity(shown: Texels, cloud: PointCloud, margin: int, done: Done) -> Baked:
     values = cloud.attributes["intensity"].reshape(len(cloud.points), -1)[:, :1].astype(np.float64)
     low, span = _range(values)
     known = Scattered(cloud.points, (values - low) / span)
-    flat = painted(shown, 1, np.uint16, lambda at, _: 65535 * known(at))
+    flat = painted(shown, 1, np.uint16, lambda at, _: 65535 * known(at), done)
     text = {"intensity of black": repr(low), "intensity of white": repr(low + span)}
     return Baked(dilated(flat, shown, margin), text, _fill(shown))
 
 
-def _position(shown: Texels, cloud: PointCloud, margin: int) -> Baked:
+def _position(shown: Texels, cloud: PointCloud, margin: int, done: Done) -> Baked:
     surface = Scattered(cloud.points, cloud.points)
     corner = cloud.points.min(axis=0)
     span = max(float(np.ptp(cloud.points, axis=0).max()), 1e-300)
-    flat = painted(shown, 3, np.uint16, lambda at, _: 65535 * (surface(at) - corner) / span)
+    flat = painted(shown, 3, np.uint16, lambda at, _: 65535 * (surface(at) - corner) / span, done)
     alpha = np.zeros(shown.size**2, dtype=np.uint16)
     alpha[shown.places[shown.inside]] = 65535
     filled = dilated(flat, shown, margin)
@@ -167,7 +184,7 @@ def _position(shown: Texels, cloud: PointCloud, margin: int) -> Baked:
     return Baked(pixels, text, _fill(shown))
 
 
-def _normal(shown: Texels, cloud: PointCloud, margin: int) -> Baked:
+def _normal(shown: Texels, cloud: PointCloud, margin: int, done: Done) -> Baked:
     if cloud.normals is None:  # was checked
         raise InputError("has no normals to bake")
     known = Scattered(cloud.points, cloud.normals)
@@ -176,7 +193,8 @@ def _normal(shown: Texels, cloud: PointCloud, margin: int) -> Baked:
     def values(at: FloatArray, rows: slice) -> FloatArray:
         return np.asarray(127.5 * (seen_from(known(at), rows) + 1))
 
-    return Baked(dilated(painted(shown, 3, np.uint8, values), shown, margin), {}, _fill(shown))
+    flat = painted(shown, 3, np.uint8, values, done)
+    return Baked(dilated(flat, shown, margin), {}, _fill(shown))
 
 
 def _range(values: FloatArray) -> tuple[float, float]:
@@ -194,6 +212,7 @@ def painted(
     channels: int,
     kind: type[np.uint8 | np.uint16],
     values: Callable[[FloatArray, slice], FloatArray],
+    done: Done = unwatched,
 ) -> Pixels:
     """(K, channels) rounded values at the texels, a batch at a time.
 
@@ -202,12 +221,14 @@ def painted(
         channels: numbers at each.
         kind: type of the result.
         values: gives them for places (k, 3) on the mesh, which are these rows of `shown`.
+        done: is called on the way.
     """
     corners = shown.charted.mesh.vertices[shown.charted.mesh.faces]
     flat = np.empty((len(shown.places), channels), dtype=kind)
     for rows in _batches(len(flat)):
         at = np.einsum("nc,ncd->nd", shown.weights(rows), corners[shown.faces[rows]])
         flat[rows] = np.clip(np.rint(values(at, rows)), 0, np.iinfo(kind).max)
+        done(min(rows.stop / len(flat), 1.0))
     return flat
 
 

@@ -9,11 +9,18 @@ from parapoint.files.attributes import unit_colours
 from parapoint.files.painting import WHITE, Painting, Picture
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.surface import FloatArray
-from parapoint.textures.baking import MARGIN, dilated, painted
+from parapoint.textures.baking import MARGIN, Done, dilated, painted, unwatched
 from parapoint.textures.texels import texels
 
 
-def repainted(charted: Charted, painting: Painting, size: int, margin: int = MARGIN) -> Picture:
+def repainted(
+    charted: Charted,
+    painting: Painting,
+    size: int,
+    margin: int = MARGIN,
+    *,
+    done: Done = unwatched,
+) -> Picture:
     """(size, size, 3 or 4) the texture of a mesh with what its file paints on it.
 
     Pictures repeat outside of the unit square, and are interpolated between their texels. Four
@@ -24,6 +31,7 @@ def repainted(charted: Charted, painting: Painting, size: int, margin: int = MAR
         painting: what is painted on its triangles, in their order.
         size: texels along a side.
         margin: texels around each chart that repeat its edge.
+        done: is called on the way.
     """
     shown = texels(charted, size)
     has_alpha = any(
@@ -45,12 +53,17 @@ def repainted(charted: Charted, painting: Painting, size: int, margin: int = MAR
                 out[here] = _seen(material.picture, uv[here], width)
         return out
 
-    flat = painted(shown, width, np.uint8, values)
+    flat = painted(shown, width, np.uint8, values, done)
     return dilated(flat, shown, margin).astype(np.uint8, copy=False)
 
 
 def coloured(
-    charted: Charted, colours: npt.NDArray[np.generic], size: int, margin: int = MARGIN
+    charted: Charted,
+    colours: npt.NDArray[np.generic],
+    size: int,
+    margin: int = MARGIN,
+    *,
+    done: Done = unwatched,
 ) -> Picture:
     """(size, size, 3) the texture of a mesh whose vertices (V,) have colours, as `PointCloud`."""
     shown = texels(charted, size)
@@ -60,7 +73,7 @@ def coloured(
         corners = known[charted.mesh.faces[shown.faces[rows]]]
         return np.asarray(np.einsum("nc,ncd->nd", shown.weights(rows), corners))
 
-    flat = painted(shown, 3, np.uint8, values)
+    flat = painted(shown, 3, np.uint8, values, done)
     return dilated(flat, shown, margin).astype(np.uint8, copy=False)
 
 

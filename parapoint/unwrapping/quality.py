@@ -5,15 +5,19 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 
 import numpy as np
+import shapely
 from scipy import sparse
 from scipy.sparse import csgraph
 
+from parapoint.planar.crossing import crossing_vertices
 from parapoint.surfaces.areas import STARVED
-from parapoint.surfaces.parameterization import Charted
-from parapoint.surfaces.surface import BoolArray, FloatArray, flat_faces, twin_halfedges
+from parapoint.surfaces.parameterization import Charted, Parameterization
+from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, flat_faces, twin_halfedges
 
 LEAST_PART = 0.01
 """Share of the surface that a starved part must hold to be looked at by itself."""
+DOUBLED = 1e-6
+"""Share of a map's area that may be covered twice by rounding alone."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +33,8 @@ class Quality:
         smallest_part: least mean area ratio of a starved part of 1 % of the surface; 1 for none.
         starved: share of the surface with an area ratio below STARVED.
         flipped: faces that are turned over.
+        overlap: whether faces lie on others: "none", "some", or "unknown" where faces are turned
+            over or an edge has more than two.
         charts: pieces of the map.
         seam: length of the cut over sqrt(area).
         filled: share of the unit square that the map fills.
@@ -42,6 +48,7 @@ class Quality:
     smallest_part: float
     starved: float
     flipped: int
+    overlap: str
     charts: int
     seam: float
     filled: float
@@ -78,6 +85,7 @@ def quality(placed: Charted, texture: int) -> Quality:
     cut = float(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum())
     whole = np.zeros((2, len(mesh.faces)))
     whole[:, solid] = share, ratio * share
+    flipped = int((signed <= 0).sum())
     return Quality(
         angle_mean=float(share @ angles.mean(axis=1)),
         angle_worst=float(angles.max()),
@@ -85,12 +93,29 @@ def quality(placed: Charted, texture: int) -> Quality:
         stretch_worst=float(stretch.max()),
         smallest_part=_smallest_part(placed, starved, *whole),
         starved=float(share[ratio < STARVED].sum()),
-        flipped=int((signed <= 0).sum()),
+        flipped=flipped,
+        overlap="unknown" if flipped else _overlap(held),
         charts=int(held.charts().max()) + 1,
         seam=cut / float(np.sqrt(area.sum())),
         filled=float(np.abs(signed).sum()),
         texels_per_unit=texture * float(np.sqrt(np.abs(signed).sum() / area.sum())),
     )
+
+
+def _overlap(held: Parameterization) -> str:
+    """Whether faces of a map without flips lie on others: "none", "some" or "unknown".
+
+    Where the boundaries of the charts cross or touch nothing, what they enclose by turns, inside
+    and outside, is the area of all faces, unless a chart lies within another.
+    """
+    flat = Mesh(np.pad(held.uv, ((0, 0), (0, 1))), held.corners)
+    if not (flat.is_manifold and flat.is_oriented):
+        return "unknown"
+    if len(crossing_vertices(flat, held.uv)):
+        return "some"
+    rings = [held.uv[np.append(loop, loop[0])] for loop in flat.boundary_loops]
+    doubled = flat.face_areas.sum() - shapely.build_area(shapely.MultiLineString(rings)).area
+    return "some" if doubled > DOUBLED * flat.face_areas.sum() else "none"
 
 
 def _normals(triangles: FloatArray) -> FloatArray:

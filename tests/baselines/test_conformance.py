@@ -25,6 +25,7 @@ ARGUMENTS = {
     "external": {"command": COPY},
     "fam": {"points": 120, "subset": 100, "iterations": 2},
     "nuvo": {"points": 120, "subset": 100, "iterations": 2},
+    "geometry_image": {"side": 17},
     "smith_schaefer": {"iterations": 60},
     "parapoint": {"points": 120, "subset": 100, "iterations": 3, "threads": 1, "device": "cpu"},
 }

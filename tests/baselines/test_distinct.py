@@ -15,6 +15,7 @@ DISK_METHODS = [
     "bff",
     "arap",
     "smith_schaefer",
+    "geometry_image",
     "slim",
     "slim(energy=conformal)",
 ]

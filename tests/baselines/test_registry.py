@@ -5,7 +5,7 @@ import textwrap
 import tomllib
 import zipfile
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import pytest
 
@@ -286,3 +286,104 @@ def test_fields_that_are_no_arguments_are_left_out(monkeypatch):
     monkeypatch.setattr(registry, "_plugins", {"sized": Sized})
     assert registry.describe("sized").parameters == {"sizes": "(1, 2)"}
     assert registry.method("sized(sizes=[3])")[1].sizes == (3,)
+
+
+PARAMETERS = {
+    "arap": {"iterations": 100},
+    "slim": {"energy": "symmetric_dirichlet", "iterations": 20},
+    "xatlas": {
+        "max_chart_area": 0.0,
+        "max_boundary_length": 0.0,
+        "normal_deviation_weight": 2.0,
+        "roundness_weight": 0.01,
+        "straightness_weight": 6.0,
+        "normal_seam_weight": 4.0,
+        "max_cost": 2.0,
+        "max_iterations": 1,
+        "fix_winding": False,
+        "max_chart_size": 0,
+        "padding": 0,
+        "texels_per_unit": 0.0,
+        "resolution": 0,
+        "bilinear": True,
+        "block_align": False,
+        "brute_force": False,
+        "rotate_charts_to_axis": True,
+        "rotate_charts": True,
+    },
+    "uvatlas": {"max_stretch": 1 / 6, "size": 512, "gutter": 1.0, "partitions": 1},
+    "uvunwrap": {
+        "max_chart_angle": 70.0,
+        "max_area_distortion": 4.0,
+        "max_chart_area": 0.0,
+        "max_boundary_length": 0.0,
+        "page_size": 1024,
+        "padding": 2,
+        "packing": "shape",
+    },
+    "blender_angle_based": {"fill_holes": False},
+    "blender_conformal": {"fill_holes": False},
+    "blender_minimum_stretch": {"iterations": 10, "no_flip": False, "fill_holes": False},
+    "blender_smart_project": {"angle_limit": 66.0, "island_margin": 0.0, "area_weight": 0.0},
+    "meshlab_voronoi": {"regions": 10},
+    "meshlab_triangles": {"border": 2, "page_size": 1024},
+    "automatic+slim": {"price": 1.0},
+    "meshed": {"reconstruction": "poisson", "flattening": "slim"},
+    "textured": {"pipeline": "computed", "texels": 2048},
+    "external": {"command": ""},
+    "computed": {
+        "points": 20_000,
+        "distortion": "balanced",
+        "time_budget": None,
+        "components": "together",
+        "seed": 0,
+    },
+    "unwrap": {
+        "points": None,
+        "time_budget": None,
+        "price": 1.0,
+        "max_distortion": None,
+        "distortion": "isometric",
+    },
+    "fam": {"points": 10_000, "iterations": 10_000, "subset": 10_000, "time_budget": None},
+    "nuvo": {"points": 10_000, "iterations": 10_000, "subset": 10_000, "time_budget": None},
+}
+"""What results without parameters in their names were measured under: those of tools are the tools'
+own. A default that changes here makes new results that cannot be told from old ones by name."""
+
+
+@pytest.mark.parametrize("name", sorted(registry.METHODS.keys() - {"parapoint"}))
+def test_defaults_stay_what_the_results_were_measured_under(name):
+    wanted = {key: repr(value) for key, value in PARAMETERS.get(name, {}).items()}
+    assert registry.describe(name).parameters == wanted
+
+
+def test_what_methods_promise_of_the_same_seed():
+    promises = {name: registry.describe(name).deterministic for name in registry.METHODS}
+    by_parameters = {name for name, promise in promises.items() if promise[0] == "b"}
+    assert by_parameters == {"unwrap", "parapoint", "computed", "fam", "nuvo"}
+    assert {name for name, promise in promises.items() if promise == "no"} == {
+        "external",
+        "uvatlas",
+    }
+    threaded = {name for name, promise in promises.items() if "threads" in promise}
+    assert threaded == {"parapoint", "fam", "nuvo"}
+
+
+def test_names_near_and_far():
+    assert registry._near("x", []) == "it has none"
+    assert registry._near("slin", ["slim", "lscm"]) == "did you mean slim?"
+    # Half of the letters in their places are near enough, and three names at most are given.
+    assert registry._near("abxx", ["abyy"]) == "did you mean abyy?"
+    assert registry._near("axxx", ["ayyy", "b"]) == "there are: ayyy, b"
+    near = registry._near("slim", ["slim1", "slim2", "slim3", "slim4"])
+    assert near.count("slim") == 3
+
+
+def test_any_value_will_do_where_the_hint_says_so_and_items_are_checked_one_by_one():
+    assert registry._checked([1, "a"], Any, "x") == [1, "a"]
+    assert registry._checked((1, 2.5), tuple[float, ...], "x") == (1.0, 2.5)
+    assert registry._checked(True, bool, "x") is True
+    assert registry._checked(True, bool | None, "x") is True
+    with pytest.raises(InputError, match="x must be bool, not 1"):
+        registry._checked(1, bool, "x")

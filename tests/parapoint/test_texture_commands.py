@@ -1,16 +1,21 @@
 """`unwrap` of clouds into textured meshes, and `bake`."""
 
 import contextlib
+import io
 import json
+import logging
 
 import numpy as np
 import pytest
 from PIL import Image
+from rich.console import Console
 
 from parapoint import ComputedMap, PointCloud, cli
 from parapoint.commands.output import write
+from parapoint.commands.progress import bar
 from parapoint.files.point_writers import write_points
 from parapoint.files.reading import read_parameterized, read_surface
+from parapoint.fitting import Progress
 from parapoint.textures.preview import SIDE
 
 COUNT = 400
@@ -70,17 +75,101 @@ def test_a_scan_becomes_a_textured_model_in_one_command(scan, tmp_path, capsys) 
     assert (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]).min() > 0
 
 
-def test_the_last_lines_of_a_cloud_say_how_good_its_map_is(scan, tmp_path, capsys) -> None:
+@pytest.mark.parametrize("command", ["unwrap", "fit", "map"])
+def test_the_last_lines_say_how_good_the_map_is(command, model, scan, tmp_path, capsys) -> None:
     target = tmp_path / "scan.glb"
-    status, out, _ = run(["unwrap", scan, "--out", target, "--texture", 64], capsys)
-    assert status == 0
+    arguments = {
+        "unwrap": ["unwrap", scan, "--out", target, "--texture", 64],
+        "fit": ["fit", scan, "--out", target],
+        "map": ["map", tmp_path / "model", scan, "--out", target],
+    }
+    model.save(tmp_path / "model")
+    status, out, err = run(arguments[command], capsys)
+    assert (status, err) == (0, "")
     first, angles, part, seam = out.splitlines()
     assert first.startswith(f"{target}: ")
-    assert "faces in" in first
+    assert " faces in " in first
     assert "° at worst; stretch" in angles
-    assert part.endswith("; 0 flipped faces")
+    assert part.endswith("; 0 flipped faces, overlap: none")
     assert seam.startswith("1 chart, seam 0")
     assert "texels per unit" in seam
+
+
+class Watched:
+    """Stands in for the bar: what it was told."""
+
+    def __init__(self) -> None:
+        self.told: list[Progress] = []
+
+    @contextlib.contextmanager
+    def __call__(self):
+        yield self.told.append
+
+    @property
+    def phases(self) -> list[str]:
+        """Each phase once, in their order."""
+        return list(dict.fromkeys(now.phase for now in self.told))
+
+
+@pytest.mark.parametrize("command", ["unwrap", "bake", "fit", "map", "mesh"])
+def test_every_phase_is_told(command, model, scan, capsys, monkeypatch) -> None:
+    tmp_path = scan.parent
+    model.save(tmp_path / "model")
+    write(model, read_surface(scan), str(tmp_path / "mesh.obj"), texture=64)
+    arguments = {
+        "unwrap": ["unwrap", scan, "--out", tmp_path / "a.glb", "--texture", 64],
+        "bake": ["bake", tmp_path / "model", scan, "--map", "colour", "--out", tmp_path / "a.png"],
+        "fit": ["fit", scan, "--out", tmp_path / "other"],
+        "map": ["map", tmp_path / "model", scan, "--out", tmp_path / "a.glb"],
+        "mesh": ["unwrap", tmp_path / "mesh.obj", "--out", tmp_path / "a.glb", "--texture", 64],
+    }
+    wanted = {
+        "unwrap": ["reading", "computing a map", "mapping", "baking", "writing"],
+        "bake": ["reading", "baking", "writing"],
+        "fit": ["reading", "computing a map", "writing", "measuring"],
+        "map": ["reading", "mapping", "baking", "writing"],
+        "mesh": ["reading", "cutting and flattening", "packing", "baking", "writing", "measuring"],
+    }
+    place = arguments[command][0]
+    watched = Watched()
+    monkeypatch.setattr(f"parapoint.commands.{place}.bar", watched)
+    assert run(arguments[command], capsys)[0] == 0
+    assert watched.phases == wanted[command]
+    shares = [now.fraction for now in watched.told if now.phase == "baking" and now.fraction]
+    assert shares == sorted(shares)
+    assert not shares or shares[-1] == 1
+
+
+def test_log_lines_stand_above_the_bar(monkeypatch) -> None:
+    drawn = io.StringIO()
+    monkeypatch.setattr(
+        "parapoint.commands.progress.terminal",
+        lambda **_: Console(file=drawn, force_terminal=True, width=60),
+    )
+    monkeypatch.setattr(logging.root, "handlers", [])
+    cli.parapoint.callback()
+    with bar() as tell:
+        tell(Progress("baking", 0.25))
+        logging.getLogger("parapoint").warning("a %s", "line")
+        tell(Progress("baking", 0.5))
+    before, _, after = drawn.getvalue().partition("a line\n")
+    assert before.endswith("\x1b[2K")  # the bar was wiped off the line
+    assert "baking" in after
+
+
+def test_the_end_is_reckoned_from_the_share_that_is_done(monkeypatch) -> None:
+    drawn = io.StringIO()
+    monkeypatch.setattr(
+        "parapoint.commands.progress.terminal",
+        lambda **_: Console(file=drawn, force_terminal=True, width=60),
+    )
+    now = iter([0.0, 100.0, 130.0])
+    monkeypatch.setattr("parapoint.commands.progress.monotonic", lambda: next(now))
+    with bar() as tell:
+        tell(Progress("reading"))
+        tell(Progress("baking"))
+        tell(Progress("baking", 0.25))
+    assert "90 s left" in drawn.getvalue()
 
 
 @pytest.mark.parametrize("saved", [True, False])

@@ -6,8 +6,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from baselines import registry
 from baselines.disks.bff import closed_curve
-from baselines.disks.slim import DENSITIES, SLIM, map_energy
+from baselines.disks.slim import DENSITIES, SLIM, is_minimum, map_energy
 from baselines.disks.tutte import Tutte, tutte
+from benchmarks.cases import builtin
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
 from parapoint.planar.domains import (
@@ -30,6 +31,7 @@ DISK_METHODS = [
     "bff",
     "arap",
     "smith_schaefer",
+    "geometry_image(side=9)",
     "slim",
     "slim(energy=conformal)",
     "slim(energy=log_arap)",
@@ -370,3 +372,40 @@ def test_a_closed_curve_is_turned_onto_its_longest_axis(start):
     u, v = (curve - curve.mean(axis=0)).T
     assert u @ v == pytest.approx(0, abs=1e-12)
     assert u @ u > v @ v
+
+
+def test_arap_energy_and_flips_by_a_second_route():
+    # Nearly a whole sphere: what Tutte's embedding squeezes around the pole, ARAP turns over.
+    mesh = builtin.sphere_cap(170, rings=8)
+    result = mapped("arap(iterations=5)", mesh)
+    areas = signed_areas(result.uv, result.corners)
+    assert result.report["flipped"] == (areas <= 0).sum() > 0
+    # Of each Jacobian J: (s1 - 1)² + (s2 - 1)² = |J|² + 2 - 2 (s1 + s2), and (s1 + s2)² =
+    # |J|² + 2 det J, where s2 has the sign of the determinant.
+    p, q = mesh.vertices[mesh.faces], result.uv[result.corners]
+    first = [np.stack([s[:, 1] - s[:, 0], s[:, 2] - s[:, 0]], axis=2) for s in (p, q)]
+    gram = [s.transpose(0, 2, 1) @ s for s in first]
+    norm = np.trace(np.linalg.solve(*gram), axis1=1, axis2=2)
+    determinant = areas / mesh.face_areas
+    both = np.sqrt(np.maximum(norm + 2 * determinant, 0))
+    share = mesh.face_areas / mesh.face_areas.sum()
+    assert share @ (norm + 2 - 2 * both) == pytest.approx(result.report["end_energy"], rel=1e-6)
+
+
+def test_slim_refuses_a_start_with_a_triangle_without_area(monkeypatch):
+    on_a_line = np.array([[0.0, 0], [1, 0], [2, 0]])
+    monkeypatch.setattr("baselines.disks.slim.tutte", lambda _: on_a_line)
+    with pytest.raises(FlatteningError, match="has 1 flipped or degenerate triangles of 1"):
+        mapped("slim", Mesh(np.eye(3), [[0, 1, 2]]))
+
+
+def test_a_start_whose_energy_has_no_number_is_no_minimum():
+    disk = domain(irregular_disk())
+    frame = frames(disk)
+    weight = np.full(len(disk.faces), 1 / len(disk.faces))
+    flipped = tutte(disk) * [1, -1]
+    for name in DENSITIES:
+        assert not is_minimum(name, weight, frame, flipped, disk.faces)
+    # Where nothing pulls, as on a triangle mapped to itself, the slope is 0 and it is one.
+    one = domain(Mesh([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
+    assert is_minimum("conformal", np.ones(1), frames(one), one.vertices[:, :2], one.faces)

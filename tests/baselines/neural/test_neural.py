@@ -1,15 +1,18 @@
 """The neural rivals: their networks' derivatives, their terms, what they make of a surface."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import torch
 
-from baselines.neural.fam import FAM, FAMTrainer
+from baselines.neural.fam import FAM, FAMTrainer, repulsion
 from baselines.neural.nuvo import Nuvo, NuvoNetworks, NuvoTrainer, encoded
 from baselines.neural.training import surface_normals
 from parapoint import PointCloud
 from parapoint.errors import InputError
 from parapoint.learned.presets import Preset
+from parapoint.surfaces.surface import Mesh
 from parapoint.testing import irregular_disk, sphere
 
 
@@ -122,3 +125,116 @@ def test_the_rivals_train_on_all_points_as_they_are():
         assert method.schedule.perturbation == 0
         assert method.schedule.warm_up == 0
         assert method.schedule.all_from == 1
+
+
+def test_the_encoding_is_the_point_and_its_waves_of_four_octaves():
+    x = torch.tensor([[[1 / 32, 1 / 3]]], dtype=torch.float64)
+    found = encoded(x)[0, 0].numpy()
+    wanted = [1 / 32, 1 / 3]
+    for times in (2, 4, 8, 16):
+        wanted += [np.sin(times * np.pi / 32), np.sin(times * np.pi / 3)]
+        wanted += [np.cos(times * np.pi / 32), np.cos(times * np.pi / 3)]
+    np.testing.assert_allclose(found, wanted, atol=1e-12)
+
+
+@pytest.mark.parametrize("method", [FAM, Nuvo])
+def test_the_map_is_in_the_unit_of_the_surface(method):
+    mesh = irregular_disk()
+    small = method(points=150, subset=100, iterations=2)
+    maps = [
+        small.parameterize(Mesh(unit * mesh.vertices, mesh.faces), seed=0).uv
+        for unit in (1.0, 1024.0)
+    ]
+    np.testing.assert_allclose(maps[1], 1024 * maps[0], rtol=1e-5, atol=1e-2)
+
+
+def test_only_a_run_without_a_time_limit_is_the_same_each_time():
+    for method in (FAM, Nuvo):
+        assert method().deterministic == (not torch.cuda.is_available())
+        assert not method(time_budget=5.0).deterministic
+
+
+def layers(sizes):
+    """Weights and biases of a stack with layers of these widths."""
+    return sum(a * b + b for a, b in pairwise(sizes))
+
+
+def test_the_networks_have_the_layers_of_their_papers():
+    def count(networks):
+        return sum(of.numel() for of in networks.parameters())
+
+    deep, narrow = [512] * 3, [512] * 2
+    offset = [
+        layers([channels, *hidden, 64]) + layers([64 + channels, *hidden, channels])
+        for channels, hidden in ((2, deep), (3, narrow))
+    ]
+    wrap = layers([2, *deep, 64]) + layers([66, *deep, 6])
+    made = trainer(FAMTrainer, None)
+    assert count(made.networks.wrap) == wrap
+    assert count(made.networks.unwrap) == layers([3, *narrow, 2])
+    deform, cut = count(made.networks.deform), count(made.networks.cut)
+    embedded = [layers([channels, *hidden, 64]) for channels, hidden in ((2, deep), (3, narrow))]
+    assert (deform > embedded[0], cut > embedded[1]) == (True, True)
+    assert (deform, cut) == tuple(offset)
+    seven = [256] * 7
+    octaves = 1 + 2 * 4
+    textured = layers([3 * octaves, *seven, 2]) + layers([2 * octaves, *seven, 3])
+    assert count(NuvoNetworks(generator())) == textured + 1  # sigma
+
+
+def test_the_repulsion_of_fam_is_that_of_eight_neighbours_within_a_quarter_of_the_spacing():
+    uv = torch.rand(40, 2, dtype=torch.float64, generator=generator())
+    apart = torch.cdist(uv, uv).sort(dim=1).values[:, 1:9]
+    side = (uv.amax(0) - uv.amin(0)).max()
+    wanted = (0.25 * side / 40**0.5 - apart).clamp(min=0).sum(1).mean()
+    assert wanted > 0
+    assert repulsion(uv).item() == pytest.approx(wanted.item(), rel=1e-6)
+    # Ten points on one place have eight others there each, as nine would; ninety are far apart.
+    apart = torch.cartesian_prod(torch.arange(1.0, 11), torch.arange(1.0, 10))
+    crowd = torch.cat([torch.zeros(10, 2), apart])
+    assert repulsion(crowd).item() == pytest.approx(0.1 * 8 * 0.25 * 10 / 10, rel=1e-4)
+
+
+def test_the_terms_of_fam_by_a_second_route():
+    made = trainer(FAMTrainer, None)
+    points, grid = made._batch()
+    there, back = made.networks(points, grid)
+    given = made.shape.points
+    terms = made.terms(points, grid, given)
+    far = torch.cdist(back.points, given)
+    wrap = max(far.amin(0).mean(), far.amin(1).mean())
+    values = torch.linalg.svdvals(there.tangents.permute(1, 2, 0)).square()
+    assert terms["wrap"].item() == pytest.approx(wrap.item(), rel=1e-4)
+    assert terms["distortion"].item() == pytest.approx(
+        (values[:, 0] - values[:, 1]).mean().item(), rel=1e-3
+    )
+    assert terms["unwrap"].item() == pytest.approx(
+        sum(repulsion(q).item() for q in (there.uv, back.uv, back.uv_cycle)), rel=1e-5
+    )
+
+
+def test_the_terms_of_nuvo_by_a_second_route(monkeypatch):
+    made = trainer(NuvoTrainer, None)
+    rows, grid = made._batch()
+    given = made.shape.points
+    turn = torch.tensor([[0.5, 0.2, -0.1], [0.1, 0.3, 0.4]])
+    monkeypatch.setattr(NuvoNetworks, "texture", lambda _, x: x @ turn.T)
+    monkeypatch.setattr(NuvoNetworks, "surface", lambda _, uv: 0.7 * uv @ turn + 0.1)
+    terms = {name: of.item() for name, of in made.terms(rows, grid, given).items()}
+
+    def surface(uv):
+        return 0.7 * uv @ turn + 0.1
+
+    square = (grid + 1) / 2
+    (p, a, b), on = (rows @ turn.T), surface(square)
+    far = torch.cdist(given, on).square()
+    cosine = torch.cosine_similarity(a, b, dim=1)
+    area = torch.linalg.det(torch.stack([a, b], dim=1)).abs()
+    wanted = {
+        "three_two_three": (surface(p) - rows[0]).square().sum(1).mean(),
+        "two_three_two": (on @ turn.T - square).square().sum(1).mean(),
+        "surface": far.amin(0).mean() + far.amin(1).mean(),
+        "conformal": cosine.square().mean(),
+        "stretch": (area - 1).square().mean(),
+    }
+    assert terms == pytest.approx({name: of.item() for name, of in wanted.items()}, rel=1e-3)

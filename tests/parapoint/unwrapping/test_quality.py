@@ -73,3 +73,28 @@ def test_a_starved_part_is_seen_from_a_hundredth_of_the_surface_on(share, is_see
     assert found.starved == pytest.approx(share)
     ratio = 0.1 / (1 - 0.9 * share)
     assert found.smallest_part == pytest.approx(ratio if is_seen else 1)
+
+
+SQUARE = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+RING = [[0, 1, 5], [0, 5, 4], [1, 2, 6], [1, 6, 5], [2, 3, 7], [2, 7, 6], [3, 0, 4], [3, 4, 7]]
+"""The faces between two squares, the outer one first."""
+
+
+@pytest.mark.parametrize(
+    ("second", "overlap"),
+    [
+        (SQUARE / 4 + 1.5, "none"),  # beside the ring
+        (SQUARE / 4 + 0.375, "none"),  # in its hole
+        (SQUARE + 0.5, "some"),  # across it
+        (SQUARE * 2 - 0.5, "some"),  # around it
+        (SQUARE / 16 + 0.05, "some"),  # within its band
+        (SQUARE[::-1] + 5, "unknown"),  # turned over
+    ],
+)
+def test_overlap_is_seen_wherever_one_chart_lies_on_another(second, overlap) -> None:
+    uv = np.concatenate([SQUARE, SQUARE / 2 + 0.25, second])
+    faces = np.array([*RING, [8, 9, 10], [8, 10, 11]])
+    points = np.pad(uv, ((0, 0), (0, 1)))
+    points[8:] = np.pad(SQUARE, ((0, 0), (0, 1))) + 9
+    found = quality(Charted(Mesh(points, faces), Parameterization(uv, faces)), 64)
+    assert found.overlap == overlap
