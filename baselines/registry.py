@@ -33,6 +33,7 @@ METHODS: dict[str, str] = {
     "harmonic": "baselines.disks.harmonic:Harmonic",
     "mean_value": "baselines.disks.mean_value:MeanValue",
     "lscm": "baselines.disks.lscm:LSCM",
+    "abf": "baselines.disks.abf:ABF",
     "arap": "baselines.disks.arap:ARAP",
     "slim": "baselines.disks.slim:SLIM",
     "smith_schaefer": "baselines.disks.smith_schaefer:SmithSchaefer",
