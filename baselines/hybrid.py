@@ -9,7 +9,7 @@ from parapoint.method import UnsupportedError
 from parapoint.parameters import check_number
 from parapoint.planar.descent import Run, sound
 from parapoint.planar.domains import domain
-from parapoint.planar.growth import PRICE, grown
+from parapoint.planar.growth import PRICE, Need, grown
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh, Surface
 from parapoint.unwrapping.given import unwrapped_along
@@ -47,7 +47,7 @@ class AutomaticSLIM:
         run.begin()
         run.improve()
         if self.price is not None:
-            run = grown(run, self.price)
+            run = grown(run, Need(self.price))
             run.improve()
         return Parameterization(run.uv, run.mesh.faces, report=run.report())
 

@@ -80,8 +80,8 @@ def unwrap(
     file written as OBJ keeps all its lines but for the UVs; without materials of its own it gets a
     checkerboard. Components are mapped one by one; with --components largest only that one is
     written. Branches of the seam grow where each lowers the energy (symmetric Dirichlet, 4 at
-    least) by --seam-price (1) for a length of the square root of the area; --max-distortion adds
-    to them until the energy is as low, within --time-budget.
+    least) by --seam-price (1) for a length of the square root of the area; or, with
+    --max-distortion, until the energy is as low and no longer, within --time-budget.
 
     --distortion isometric keeps angles and areas alike; balanced keeps angles as far as every part
     keeps its area; conformal keeps angles alone, whatever becomes of an ear or a finger.
@@ -140,6 +140,10 @@ class Asked:
         for option, value in unused.items():
             if self.seams is not None and value is not None:
                 raise InputError(f"{option} does not go with --seams, which are cut as they are")
+        if self.seam_price is not None and self.max_distortion is not None:
+            raise InputError(
+                "--seam-price does not go with --max-distortion, which alone says how far to cut"
+            )
         if self.seam_price is not None and self.distortion == "conformal":
             raise InputError("--seam-price does not go with --distortion conformal")
 

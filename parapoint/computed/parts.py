@@ -18,7 +18,7 @@ import numpy as np
 
 from parapoint.planar.bijection import is_bijective
 from parapoint.planar.descent import Run
-from parapoint.planar.growth import PRICE, grown
+from parapoint.planar.growth import Need, grown
 from parapoint.planar.scaffold import LEAST_GAIN, excess, of_area_one, steps_down
 from parapoint.surfaces.areas import signed_areas, starved_share
 from parapoint.surfaces.surface import FloatArray, Mesh
@@ -57,7 +57,7 @@ def parts_kept(
     run = Run(unit, deadline)
     run.take(uv, "conformal")
     run.improve()
-    run = grown(run, PRICE, most_starved=MOST_STARVED)
+    run = grown(run, Need(most_starved=MOST_STARVED))
     unit, uv = run.mesh, run.uv
     if distortion == "balanced":
         uv = towards_conformal(unit, uv, deadline)

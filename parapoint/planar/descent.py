@@ -18,7 +18,7 @@ from parapoint.planar.scaffold import (
     of_area_one,
     steps_down,
 )
-from parapoint.surfaces.cutting import cut_along, origin
+from parapoint.surfaces.cutting import cut_along, edge_lengths, origin
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 
 ENERGY = igl.SYMMETRIC_DIRICHLET
@@ -40,7 +40,7 @@ class Run:
             of the singular values s1 and s2 of each triangle's map.
         unit: sqrt(area).
         start: what it began with.
-        branches: branches that the seam grew.
+        tips: the vertices of the first domain to which branches of the seam were grown, in order.
         grown_from: the run before the last branch, and the branch's path of vertices to the seam.
         is_free: whether the boundary may cross itself; the map is then without flips, but perhaps
             not one to one.
@@ -51,8 +51,19 @@ class Run:
         self.mesh, self.deadline, self.is_free = mesh, deadline, is_free
         self.unit = float(np.sqrt(mesh.face_areas.sum()))
         self.uv: FloatArray = np.zeros((0, 2))
-        self.energy, self.start, self.branches = math.inf, "none", 0
+        self.energy, self.start = math.inf, "none"
+        self.tips: tuple[int, ...] = ()
         self.grown_from: tuple[Run, IntArray] | None = None
+
+    @property
+    def branches(self) -> int:
+        """Branches that the seam grew."""
+        return len(self.tips)
+
+    @property
+    def rim(self) -> float:
+        """Length of the boundary, in which each edge of the seam counts twice."""
+        return float(edge_lengths(self.mesh)[self.mesh.edge_face_count == 1].sum())
 
     @property
     def is_late(self) -> bool:
@@ -110,12 +121,12 @@ class Run:
         """Another run whose seam is longer by a path of vertices (n,); None where that fails.
 
         Args:
-            path: from the seam or the boundary to a vertex inside.
+            path: from a vertex inside to the seam or the boundary.
             goal: as of `improve`, for a free map.
         """
         mesh = cut_along(self.mesh, np.stack([path[:-1], path[1:]], axis=1))
         longer = Run(mesh, self.deadline, is_free=self.is_free)
-        longer.branches = self.branches + 1
+        longer.tips = (*self.tips, int(path[0]))  # a cut leaves its vertex where it was
         uv = self.uv[origin(self.mesh, mesh)]
         if self.is_free:
             longer.take(uv, self.start)
@@ -133,7 +144,7 @@ class Run:
         left = self.deadline - time.monotonic()
         free = Run(self.mesh, time.monotonic() + left / 2, is_free=True)
         free.take(self.uv, self.start)
-        free.branches = self.branches
+        free.tips = self.tips
         free.improve()
         return free
 
@@ -145,7 +156,7 @@ class Run:
         except FlatteningError:
             return None
         held.improve()
-        held.branches = self.branches
+        held.tips = self.tips
         return held
 
     def report(self) -> dict[str, object]:

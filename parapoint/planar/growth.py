@@ -30,15 +30,16 @@ class Need:
     """What a seam is to bring.
 
     Attributes:
-        price: what the energy must fall by for each sqrt(area) of seam.
+        price: what the energy must fall by for each sqrt(area) of seam; infinite where the seam is
+            to grow in need alone.
         most_starved: share of the surface that may be starved of area; above it more seam is
             needed.
         most_energy: above this energy more seam is needed.
     """
 
-    price: float
-    most_starved: float
-    most_energy: float
+    price: float = PRICE
+    most_starved: float = MOST_STARVED
+    most_energy: float = np.inf
 
     def is_starved(self, run: Run) -> bool:
         """Whether too much of the surface is starved of area."""
@@ -48,6 +49,10 @@ class Need:
         """Whether more seam is needed at any price."""
         return self.is_starved(run) or run.energy > self.most_energy
 
+    def may_grow(self, run: Run) -> bool:
+        """Whether any branch could be worth its length."""
+        return self.price < np.inf or self.of(run)
+
     def least(self, run: Run, length: float) -> float:
         """What the energy must fall by for a branch of a length in the unit of the mesh."""
         paid = self.price * length / run.unit
@@ -56,13 +61,7 @@ class Need:
         return paid
 
 
-def grown(
-    run: Run,
-    price: float,
-    *,
-    most_starved: float = MOST_STARVED,
-    most_energy: float = np.inf,
-) -> Run:
+def grown(run: Run, need: Need) -> Run:
     """The map after its seam was led on to where it is most distorted.
 
     A branch stays where it pays, or where more seam is needed and it brings anything. Branches are
@@ -73,17 +72,14 @@ def grown(
 
     Args:
         run: the map, settled; it is left as it is.
-        price: see `Need`.
-        most_starved: see `Need`.
-        most_energy: see `Need`.
+        need: what the seam is to bring.
     """
-    need = Need(price, most_starved, most_energy)
-    while not run.is_late:
+    while need.may_grow(run) and not run.is_late:
         free = _led_on(run.freed(), need)
         longer = free.held(run.deadline) if free.branches > run.branches else None
         if longer is None:
             break
-        added = (_rim(free.mesh) - _rim(run.mesh)) / 2
+        added = (free.rim - run.rim) / 2
         if not run.energy - longer.energy > need.least(run, added):
             break
         run = longer
@@ -95,7 +91,10 @@ def grown(
 
 def _led_on(run: Run, need: Need) -> Run:
     """The map after branches were tried one after another, to where it is most distorted."""
-    while run.branches < MOST_BRANCHES and (longer := _longer(run, need)) is not None:
+    while run.branches < MOST_BRANCHES and need.may_grow(run):
+        longer = _longer(run, need)
+        if longer is None:
+            break
         run = longer
     return run
 
@@ -145,11 +144,6 @@ def _shortened(run: Run, need: Need) -> Run:
         else:
             shortest, enough = shorter, middle
     return shortest
-
-
-def _rim(mesh: Mesh) -> float:
-    """Length of the boundary."""
-    return float(edge_lengths(mesh)[mesh.edge_face_count == 1].sum())
 
 
 def _corners(mesh: Mesh, faces: BoolArray) -> BoolArray:

@@ -16,9 +16,10 @@ from parapoint.computed.reconstruction import ReconstructionError
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
 from parapoint.parameters import LONGEST_SECONDS, check_choice, check_number
+from parapoint.planar.coarse import LARGE, grown_as_coarse
 from parapoint.planar.descent import LEAST_ENERGY, Run, sound
 from parapoint.planar.embedding import embeddable
-from parapoint.planar.growth import PRICE, grown
+from parapoint.planar.growth import PRICE, Need, grown
 from parapoint.planar.scaffold import of_area_one
 from parapoint.surfaces.across_seams import learned_seam
 from parapoint.surfaces.areas import MOST_STARVED
@@ -48,13 +49,14 @@ class Unwrap:
 
     The symmetric Dirichlet energy is brought down from Tutte's embedding; the boundary never
     crosses itself (`parapoint.planar.scaffold`). Then the seam grows to where the map is most
-    distorted (`parapoint.planar.growth`), as long as that pays, and on until hardly a place is
-    starved of area and a bound on the energy is met.
+    distorted (`parapoint.planar.growth`), as long as that pays, or until a bound on the energy is
+    met, and on until hardly a place is starved of area.
 
-    A disk, with or without holes, begins without a seam, unless its map must come below a bound on
-    the energy: that takes long seams, which are sooner found. It is then cut, as any other mesh,
-    along the seam of `ComputedMap`, made a clean path of edges (`parapoint.surfaces.across_seams`),
-    or along the automatic cut (`parapoint.surfaces.cutting`) where no map can be computed.
+    A disk, with or without holes, begins without a seam. Any other mesh is cut along the seam of
+    `ComputedMap`, made a clean path of edges (`parapoint.surfaces.across_seams`), or along the
+    automatic cut (`parapoint.surfaces.cutting`) where no map can be computed. Where the map must
+    come below a bound on the energy, a disk is begun in both ways, and the shorter seam stays.
+    Where to a large mesh's seam grows is told by a simplified one (`parapoint.planar.coarse`).
     Components are mapped one after another.
 
     Attributes:
@@ -62,9 +64,10 @@ class Unwrap:
         time_budget: seconds for each component, or None for no bound. No step begins after that;
             the map is then as good as it has become.
         price: what the symmetric Dirichlet energy (4 at least) must fall by for each sqrt(area) of
-            seam; None for the learned seam, no shorter and no longer.
-        max_distortion: symmetric Dirichlet energy, above 4, down to which the seam grows at
-            whatever price; None for no such bound. The report has the energy that was reached.
+            seam; None for the learned seam, no shorter and no longer. Under a bound on the energy
+            it is not asked.
+        max_distortion: symmetric Dirichlet energy, above 4, down to which the seam grows and no
+            longer; None for no such bound. The report has the energy that was reached.
         distortion: "isometric" weighs angles and areas alike, as the energy does; "balanced" goes
             on from there to keep angles as far as every part keeps its area; "conformal" keeps
             angles along the first seam, whatever becomes of an ear or a finger.
@@ -140,18 +143,18 @@ class Unwrap:
         deadline = math.inf
         if self.time_budget is not None:
             deadline = time.monotonic() + STEPPING * self.time_budget
-        grows = self.price is not None and self.distortion != "conformal"
-        most = self.max_distortion or math.inf
         seam: BoolArray = np.zeros(len(mesh.edges), dtype=bool)
         computed: dict[str, object] = {"not_asked": "the mesh is a disk, with or without holes"}
-        run = self._descended(mesh, seam, deadline) if grows and mesh.is_planar_domain else None
-        if run is None or run.energy > most:
+        run = None
+        if self._grows and mesh.is_planar_domain:
+            half = time.monotonic() + (deadline - time.monotonic()) / 2
+            run = self._grown(mesh, seam, deadline if self.max_distortion is None else half)
+        if run is None or (self.max_distortion is not None and self._is_cut_or_in_need(run)):
             seam, computed = self._seam(mesh, seed, deadline)
-            run = self._descended(mesh, seam, deadline)
-        if grows:
-            assert self.price is not None
-            run = grown(run, self.price, most_energy=most)
-            run.improve()
+            other = self._grown(mesh, seam, deadline)
+            run = other if run is None else min(run, other, key=self._cost)
+        run.deadline = deadline
+        run.improve()
         self._keep_angles(run)
         report = {
             **run.report(),
@@ -160,12 +163,44 @@ class Unwrap:
         }
         return Parameterization(run.uv, run.mesh.faces, report=report)
 
-    def _descended(self, mesh: Mesh, seam: BoolArray, deadline: float) -> Run:
-        """The settled map of the mesh cut along some edges (E,), which make it a planar domain."""
+    @property
+    def _grows(self) -> bool:
+        """Whether the seam is led on to where the map is most distorted."""
+        return self.price is not None and self.distortion != "conformal"
+
+    @property
+    def _need(self) -> Need:
+        """What the seam is to bring."""
+        if self.max_distortion is not None:
+            return Need(math.inf, most_energy=self.max_distortion)
+        return Need(PRICE if self.price is None else self.price)
+
+    def _is_cut_or_in_need(self, run: Run) -> bool:
+        """Whether a map that begins without a seam has got one, or lacks something still."""
+        return run.branches > 0 or self._need.of(run)
+
+    def _cost(self, run: Run) -> tuple[bool, float]:
+        """By which of two maps is worse: one that lacks something, or has the longer seam."""
+        return self._need.of(run), run.rim
+
+    def _grown(self, mesh: Mesh, seam: BoolArray, deadline: float) -> Run:
+        """The settled map of the mesh cut along some edges (E,), and on from there.
+
+        Args:
+            mesh: what is to be mapped.
+            seam: edges that make a planar domain of it.
+            deadline: no step begins after this time of `time.monotonic`.
+        """
         run = Run(embeddable(cut_along(mesh, mesh.edges[seam])), deadline)
         run.begin()
         run.improve()
-        return run
+        if not self._grows:
+            return run
+        if len(mesh.faces) > LARGE:
+            run = grown_as_coarse(run, self._need)
+            if not self._need.of(run):
+                return run
+        return grown(run, self._need)
 
     def _seam(self, mesh: Mesh, seed: int, deadline: float) -> tuple[BoolArray, dict[str, object]]:
         """(E,) the edges along the seam of the computed map, and the report of that map.

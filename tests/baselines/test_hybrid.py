@@ -12,7 +12,7 @@ from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
 from parapoint.planar.crossing import crossing_vertices
 from parapoint.planar.descent import Run
-from parapoint.planar.growth import grown
+from parapoint.planar.growth import Need, grown
 from parapoint.surfaces.across_seams import learned_seam
 from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.cutting import cut_along, cut_to_disk, disk_cut, edge_lengths
@@ -157,7 +157,7 @@ def test_a_branch_must_pay():
         run = Run(cap)
         run.begin()
         run.improve()
-        run = grown(run, price)
+        run = grown(run, Need(price))
         energies.append(run.energy)
         assert (run.branches > 0) == (price < 1)
         assert len(crossing_vertices(run.mesh, run.uv)) == 0
@@ -171,7 +171,7 @@ def test_the_price_of_a_seam_is_the_same_at_every_scale():
         run = Run(Mesh(scale * cap.vertices, cap.faces))
         run.begin()
         run.improve()
-        run = grown(run, 0.05)
+        run = grown(run, Need(0.05))
         found.append((run.branches, run.energy))
     assert found[0][0] > 0
     assert found[1] == pytest.approx(found[0], rel=1e-3)

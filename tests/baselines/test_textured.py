@@ -28,7 +28,7 @@ def test_a_texture_is_read_bilinearly_at_the_nearest_place() -> None:
 
 def test_the_bake_of_today_takes_the_nearest_colour() -> None:
     points = np.array([[0.2, 0.5, 0.0], [0.9, 0.5, 0.0]])
-    colours = np.array([[9, 0, 0], [0, 7, 0]], dtype=np.uint8)
+    colours = np.array([[200, 0, 255], [0, 127, 0]], dtype=np.uint8)
     pixels = nearest_baked(PLATE, PointCloud(points, attributes={"colours": colours}), 20)
     assert (pixels[:, :11] == colours[0]).all()
     assert (pixels[:, 11:] == colours[1]).all()

@@ -68,7 +68,7 @@ Position = tuple[int, int]
 
 
 def ignored(source: str) -> list[tuple[Position, Position]]:
-    """Where no mutant is made: type hints, decorators, messages, imports, LOOKS, ABOUT."""
+    """Where no mutant is made: type hints, decorators, messages, imports, and so on."""
     lines = source.splitlines()
 
     def span(node: ast.AST) -> tuple[Position, Position]:
@@ -89,6 +89,7 @@ def ignored(source: str) -> list[tuple[Position, Position]]:
             name = getattr(node.func, "attr", getattr(node.func, "id", ""))
             found += [node] if name in TALK else []
             found += [key for key in node.keywords if key.arg in LOOKS]
+            found += [one for one in node.args if name == "reshape" and is_rest(one)]
         elif isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING":
             found.append(node)
         elif isinstance(node, ast.arg | ast.AnnAssign):
@@ -101,6 +102,11 @@ def ignored(source: str) -> list[tuple[Position, Position]]:
 def is_about(node: ast.AST) -> bool:
     """Whether a node is a whole number of ABOUT or more."""
     return isinstance(node, ast.Constant) and type(node.value) is int and node.value >= ABOUT
+
+
+def is_rest(node: ast.AST) -> bool:
+    """Whether a node is the -1 of `reshape`, for which any other negative number would do."""
+    return isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub)
 
 
 def is_star(node: parso.tree.NodeOrLeaf) -> bool:

@@ -19,7 +19,7 @@ def test_a_seam_leads_to_what_is_starved() -> None:
     before = evaluate(mesh, Parameterization(run.uv, mesh.faces))["starved_area_fraction"]
     assert before > MOST_STARVED
     assert abs(starved_share(run.mesh, run.uv) - before) < 1e-9
-    run = grown(run, 1e9)
+    run = grown(run, Need(1e9))
     assert run.branches >= 1
     found = evaluate(mesh, Parameterization(run.uv, run.mesh.faces))
     assert found["starved_area_fraction"] <= MOST_STARVED

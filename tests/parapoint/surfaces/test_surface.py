@@ -126,8 +126,8 @@ def test_arrays_are_copied_and_read_only():
     [
         ([[0, 0, np.nan], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], "vertices must be finite; row 0"),
         ([[0, 0, 0], [1, 0, np.inf], [0, 1, 0]], [[0, 1, 2]], "vertices must be finite; row 1"),
-        (CORNERS, [[0, 1, 4]], "vertices run from 0 to 3"),
-        (CORNERS, [[0, 1, -1]], "vertices run from 0 to 3"),
+        (CORNERS, [[0, 1, 3], [0, 1, 4]], r"face 1 is \[0, 1, 4\], but vertices run from 0 to 3"),
+        (CORNERS, [[0, 1, 3], [0, 1, -1], [4, 1, 2]], r"face 1 is .* vertices run from 0 to 3"),
         (CORNERS, np.zeros((0, 3)), "at least one face"),
         (CORNERS, [[0, 1]], r"faces must have shape \(n, 3\)"),
         (np.zeros((4, 2)), TETRAHEDRON, r"vertices must have shape \(n, 3\)"),

@@ -176,6 +176,35 @@ def test_a_lower_bound_makes_a_longer_seam() -> None:
     assert seam[1] > seam[0]
 
 
+def test_under_a_bound_the_shorter_of_two_seams_stays(monkeypatch) -> None:
+    from benchmarks.cases import builtin
+
+    cap = builtin.sphere_cap(150, rings=8)
+    method = Unwrap(points=150, max_distortion=4.6)
+    runs = []
+    grown = Unwrap._grown
+
+    def kept(self, mesh, seam, deadline):
+        runs.append(grown(self, mesh, seam, deadline))
+        return runs[-1]
+
+    monkeypatch.setattr(Unwrap, "_grown", kept)
+    report = method.unwrapped(cap).report["parts"][0]
+    met = [run for run in runs if run.energy <= 4.6]
+    assert len(runs) == 2
+    assert report["end_energy"] == min(met, key=lambda run: run.rim).energy
+
+
+def test_no_price_lengthens_a_seam_that_meets_its_bound() -> None:
+    from benchmarks.cases import builtin
+
+    cap = builtin.sphere_cap(150, rings=8)
+    whole = Unwrap(price=1e9).unwrapped(cap).report["parts"][0]
+    assert Unwrap().unwrapped(cap).report["parts"][0]["branches_added"] > 0
+    bounded = Unwrap(max_distortion=1.01 * whole["end_energy"]).unwrapped(cap)
+    assert bounded.report["parts"][0]["branches_added"] == whole["branches_added"]
+
+
 @pytest.fixture(scope="module")
 def bump():
     """A sphere but for a cap: along no cut, angles and areas are not to be had together."""
@@ -207,6 +236,7 @@ def test_a_map_that_is_to_keep_angles_keeps_them_better(bump, distortion) -> Non
     [
         (["--distortion", "conformal", "--max-distortion", 4.5], "max_distortion bounds an energy"),
         (["--distortion", "conformal", "--seam-price", 1], "--seam-price does not go"),
+        (["--max-distortion", 4.5, "--seam-price", 1], "--max-distortion, which alone says"),
         (["--distortion", "wavy"], "isometric"),
     ],
 )

@@ -1,0 +1,86 @@
+"""Where the seam of a large mesh should grow, told by a simplified one.
+
+To where a map is distorted is a matter of the whole shape, which few faces show. Only the ends of
+the branches are taken over: on the large mesh they are joined to the seam along its own edges.
+"""
+
+from __future__ import annotations
+
+import igl
+import numpy as np
+from scipy.sparse import csgraph
+
+from parapoint.planar.descent import Run
+from parapoint.planar.domains import FlatteningError
+from parapoint.planar.growth import Need, grown
+from parapoint.surfaces.cutting import cut_along, edge_graph, edge_lengths, path_to
+from parapoint.surfaces.surface import IntArray, Mesh, flat_faces
+
+COARSE = 4_000
+"""Faces of the simplified mesh."""
+LARGE = 8_000
+"""Faces from which on a mesh is simplified: below, its own growth takes a few seconds."""
+
+
+def grown_as_coarse(run: Run, need: Need) -> Run:
+    """The map after its seam grew to where that of the simplified mesh did.
+
+    It is the run itself where the simplified mesh tells of no branches, or these do not pay.
+
+    Args:
+        run: the map, settled; it is left as it is.
+        need: what the seam is to bring.
+    """
+    simple = simplified(run.mesh)
+    if simple is None:
+        return run
+    coarse, vertex = simple
+    guess = Run(coarse, run.deadline)
+    try:
+        guess.begin()
+    except FlatteningError:
+        return run
+    guess.improve()
+    guess = grown(guess, need)
+    if not guess.tips:
+        return run
+    tips = vertex[list(guess.tips)].tolist()
+    longer = Run(joined(run.mesh, tips), run.deadline).held(run.deadline)
+    if longer is None or not run.energy - longer.energy > need.least(
+        run, (longer.rim - run.rim) / 2
+    ):
+        return run
+    longer.tips = (*run.tips, *tips)
+    return longer
+
+
+def simplified(mesh: Mesh) -> tuple[Mesh, IntArray] | None:
+    """A mesh of COARSE faces, and the vertex of the large mesh that each of its vertices is.
+
+    None where the simplified mesh is another kind of surface, or has faces without area.
+    """
+    _, faces, _, vertex = igl.qslim(
+        np.asfortranarray(mesh.vertices), np.asfortranarray(mesh.faces.astype(np.int32)), COARSE
+    )
+    coarse = Mesh(mesh.vertices[vertex], faces)
+    is_alike = (
+        coarse.is_manifold
+        and coarse.is_planar_domain
+        and len(coarse.boundary_loops) == len(mesh.boundary_loops)
+    )
+    if not is_alike or flat_faces(coarse.vertices, coarse.faces).any():
+        return None
+    return coarse, vertex
+
+
+def joined(mesh: Mesh, tips: list[int]) -> Mesh:
+    """The domain cut along the shortest paths of edges from its boundary to each tip in turn."""
+    for tip in tips:
+        graph = edge_graph(mesh, edge_lengths(mesh))
+        rim = np.concatenate(mesh.boundary_loops)
+        _, previous, _ = csgraph.dijkstra(
+            graph, indices=rim, return_predecessors=True, min_only=True
+        )
+        path = np.array(path_to(previous, tip))
+        mesh = cut_along(mesh, np.stack([path[:-1], path[1:]], axis=1))
+    return mesh

@@ -1,0 +1,58 @@
+"""Growth of the seam of a large mesh to where that of a simplified one grew."""
+
+import numpy as np
+import pytest
+
+from benchmarks.cases import builtin
+from benchmarks.metrics.evaluation import evaluate
+from parapoint.planar import coarse
+from parapoint.planar.coarse import grown_as_coarse, joined, simplified
+from parapoint.planar.descent import Run
+from parapoint.planar.growth import Need, grown
+from parapoint.surfaces.parameterization import Parameterization
+
+
+@pytest.fixture
+def few(monkeypatch) -> int:
+    """Faces of a simplified mesh, few enough for a test."""
+    monkeypatch.setattr(coarse, "COARSE", 400)
+    return 400
+
+
+def test_a_simplified_mesh_has_vertices_of_the_large_one(few) -> None:
+    mesh = builtin.finger()
+    assert len(mesh.faces) > 2 * few
+    found = simplified(mesh)
+    assert found is not None
+    simple, vertex = found
+    assert len(simple.faces) <= few
+    assert len(simple.boundary_loops) == 1
+    assert (simple.vertices == mesh.vertices[vertex]).all()
+
+
+@pytest.mark.usefixtures("few")
+def test_the_seam_grows_to_where_that_of_the_simplified_mesh_did() -> None:
+    mesh = builtin.finger()
+    run = Run(mesh)
+    run.begin()
+    run.improve()
+    need = Need(1e9)
+    assert need.of(run)
+    longer, slow = grown_as_coarse(run, need), grown(run, need)
+    assert longer.branches >= 1
+    assert not need.of(longer)
+    assert longer.energy < 1.2 * slow.energy
+    assert longer.rim - run.rim < 1.3 * (slow.rim - run.rim)
+    found = evaluate(mesh, Parameterization(longer.uv, longer.mesh.faces))
+    assert found["flipped_fraction"] == found["overlap_area"] == 0
+    assert grown_as_coarse(longer, Need(1e9)) is longer
+
+
+def test_branches_are_joined_to_the_seam_by_short_paths() -> None:
+    mesh = builtin.wavy_sheet(8)
+    inside = np.setdiff1d(np.arange(len(mesh.vertices)), np.concatenate(mesh.boundary_loops))
+    tip = int(inside[len(inside) // 2])
+    cut = joined(mesh, [tip])
+    assert len(cut.faces) == len(mesh.faces)
+    assert len(cut.boundary_loops) == 1
+    assert tip in cut.boundary_loops[0]
