@@ -31,6 +31,7 @@ CREDITS = {
     "harmonic": Credit(LIBIGL, ("pinkall1993", "eck1995", "libigl")),
     "mean_value": Credit(OURS, ("floater2003",)),
     "lscm": Credit(LIBIGL, ("levy2002", "libigl")),
+    "abf": Credit(LIBIGL, ("sheffer2005", "libigl")),
     "arap": Credit(LIBIGL, ("liu2008", "libigl")),
     "slim": Credit(LIBIGL, ("rabinovich2017", "libigl")),
     "smith_schaefer": Credit(OURS, ("smith2015",)),

@@ -42,6 +42,7 @@ DISPLAY: dict[str, tuple[str, str]] = {
     "mean_value": ("Mean value", "mean-value weights"),
     "lscm": ("LSCM", "linear conformal energy"),
     "bff": ("BFF", "boundary first, conformal"),
+    "abf": ("ABF++", "angles nearest to those in space"),
     "arap": ("ARAP", "as-rigid-as-possible energy"),
     "slim": ("SLIM", ""),
     "smith_schaefer": ("Smith and Schaefer", "symmetric Dirichlet, one to one"),

@@ -8,6 +8,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
@@ -86,6 +87,11 @@ class Display(Progress):
     ) -> None:
         """Remove the bar."""
         self._bar.stop()
+
+    def installing(self, requirements: Sequence[str], folder: Path) -> None:
+        """Say what is installed where: it may take minutes, and room on the disk."""
+        line = f"installing {', '.join(requirements)} into {folder}, once"
+        print(printable(line, LONGEST_MESSAGE), file=sys.stderr, flush=True)
 
     def planned(self, summary: Summary) -> None:
         """Print what the run is going to do, and why."""

@@ -106,16 +106,17 @@ def methods() -> Table:
     """Each method with what it requires and its parameters."""
     from baselines import registry
 
-    table = _table("method", "requires", "deterministic", "parameters", "summary")
+    table = _table("method", "requires", "environment", "deterministic", "parameters", "summary")
     for name in registry.names():
         try:
             about = registry.describe(name)
         except (ImportError, InputError) as error:
-            _add(table, name, "", "", "", str(error))
+            _add(table, name, "", "", "", "", str(error))
             continue
         parameters = ", ".join(f"{key}={value}" for key, value in about.parameters.items())
         requires = ", ".join(about.requires)
-        _add(table, name, requires, about.deterministic, parameters, about.summary)
+        own = ", ".join(about.environment)
+        _add(table, name, requires, own, about.deterministic, parameters, about.summary)
     return table
 
 
@@ -127,10 +128,11 @@ def about(method: str) -> list[str]:
         found = registry.describe(registry.RENAMED.get(method, method))
     except (ImportError, InputError):
         return []
-    needs = ", ".join(found.requires) or "nothing"
+    needs, own = ", ".join(found.requires) or "nothing", ", ".join(found.environment)
     return [
         found.summary,
         f"Needs: {needs}. The same map for the same seed: {found.deterministic}.",
+        *([f"A run makes it an environment: {own}."] if own else []),
         *([f"Licence: {found.licence}."] if found.licence else []),
     ]
 

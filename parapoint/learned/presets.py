@@ -206,7 +206,7 @@ LEARNED = Preset(
 
 - Networks: a smooth activation (a piecewise linear network has a piecewise constant Jacobian),
   Fourier features of their inputs, and gates in Cut, which can so open a surface at once.
-- Start: in place of the hull a computed map, whose values and derivatives, and the banks of whose
+- Start: in place of the hull a computed map, whose values and derivatives, and the sides of whose
   seams, the networks are taught (`parapoint.learned.start`, `parapoint.learned.taught`).
 - Losses: the conformal and the anti-flip term look at the map of the points (`unfolding_loss`)
   and not at that of the plane; areas count a little.

@@ -153,8 +153,8 @@ def edges_across(mesh: Mesh, path: list[int]) -> np.ndarray:
 
 def test_a_toothed_seam_runs_between_two_rows_of_points() -> None:
     # The slit goes up columns 5 and 6 of a grid whose cells have a diagonal up to the right. With
-    # column 5 on its left bank and 6 on its right the seam is crossed by the two edges to the right
-    # of each of (5, 0) to (5, 3), less the slit's last edge: 7. With one bank for all it is 10.
+    # column 5 on its left side and 6 on its right the seam is crossed by the two edges to the right
+    # of each of (5, 0) to (5, 3), less the slit's last edge: 7. With one side for all it is 10.
     path = [5, 16, 28, 27, 39, 38, 50]  # (5, 0), (5, 1), (6, 2), (5, 2), (6, 3), ...
     assert len(edges_across(grid(11), path)) == 7
 
