@@ -51,6 +51,7 @@ METHODS: dict[str, str] = {
     "meshlab_voronoi": "baselines.tools.meshlab:MeshLabVoronoi",
     "meshlab_triangles": "baselines.tools.meshlab:MeshLabTriangles",
     "unwrap": "parapoint.unwrapping.unwrap:Unwrap",
+    "seamster": "baselines.seamster:Seamster",
     "automatic+slim": "baselines.hybrid:AutomaticSLIM",
     "artist+slim": "baselines.hybrid:ArtistSLIM",
     "meshed": "baselines.meshed:Meshed",

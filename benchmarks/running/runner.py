@@ -26,14 +26,12 @@ from benchmarks.store import measuring, versions
 from benchmarks.store.results import Store
 from benchmarks.store.rows import MISSING, ResultRow
 from parapoint.method import MissingError
-from parapoint.parameters import LONGEST_SECONDS, check_number, check_whole
+from parapoint.parameters import LONGEST_SECONDS, MOST_MEMORY, check_number, check_whole
 
 TIME_LIMIT = 1800.0
 """Wall time in seconds that a cell may take, where the user sets no other limit."""
 MOST_JOBS = 4096
 """Most cells that may be asked to run at a time."""
-MOST_MEMORY = 1e6
-"""Most memory, in GB, that a cell may be allowed to hold."""
 
 
 @dataclass

@@ -33,6 +33,8 @@ STARTING = 0.25
 """Share of the time budget after which a computed start is improved no more."""
 KEPT_MAPS = 8
 """Maps that go into the trace of `parameterize`, evenly over the run."""
+MOST_THREADS = 1024
+"""Most threads that torch is asked for: a million of them end the process."""
 
 
 @dataclass(repr=False)
@@ -110,7 +112,7 @@ class ParaPoint(Estimator):
         if self.device != "auto":
             device_of(self.device)
         if self.threads is not None:
-            check_whole("threads", self.threads, 1)
+            check_whole("threads", self.threads, 1, MOST_THREADS)
 
     def numbers(self, start: str | None = None) -> Preset:
         """The preset with this estimator's parameters in it, or with another start.

@@ -21,6 +21,8 @@ CHOICES = {
     "start": ("hull", "computed"),
 }
 """What each setting in words may say."""
+LARGEST = 10**9
+"""Largest count or weight of a preset: steps of some thirty years, and no float32 overflows."""
 NUMBERS = (
     "perturbation",
     "unwrap_weight",
@@ -124,7 +126,7 @@ class Preset:
             ("subset", FEWEST_POINTS),
             ("iterations", 1),
         ):
-            check_whole(name, getattr(self, name), least)
+            check_whole(name, getattr(self, name), least, LARGEST)
         for name in ("patch", "starts", "embedding", "unwrap_neighbours", "anti_flip_neighbours"):
             check_whole(name, getattr(self, name), 1)
         for name in ("features", "gates"):
@@ -136,7 +138,7 @@ class Preset:
         for name in ("all_from", "warm_up"):
             check_number(name, getattr(self, name), most=1.0)
         for name in NUMBERS:
-            check_number(name, getattr(self, name))
+            check_number(name, getattr(self, name), most=LARGEST)
         if self.learning_rate is not None:
             check_number("learning_rate", self.learning_rate)
         if self.start == "computed" and self.branches == "2d":
