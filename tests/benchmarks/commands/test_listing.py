@@ -1,39 +1,10 @@
-"""Lists for terminals of any width."""
-
-import io
-
-from rich.console import Console
-from rich.table import Table
+"""What there is, in lists."""
 
 from baselines import registry
 from benchmarks.cases import models
 from benchmarks.cases.suites import SUITES
 from benchmarks.commands import listing
 from benchmarks.metrics.table import METRICS
-
-
-def shown(made, width=60) -> list[str]:
-    console = Console(width=width, file=io.StringIO())
-    console.print(made)
-    return [line.rstrip() for line in console.file.getvalue().splitlines()]
-
-
-def test_short_facts_stand_beside_the_name_and_long_ones_below():
-    table = Table("name", "first", "second", "third")
-    table.add_row("one", "1", "2", "x" * 21)
-    table.add_row("two", "", "[b]", "y")
-    table.add_row("three", "", "", "")
-    assert shown(listing.entries(table)) == [
-        "one   first: 1; second: 2",
-        "    third: " + "x" * 21,
-        "two   second: [b]",
-        "    third: y",
-        "three",
-    ]
-    # Twenty letters are short still.
-    table = Table("name", "first")
-    table.add_row("one", "x" * 20)
-    assert shown(listing.entries(table)) == ["one   first: " + "x" * 20]
 
 
 def test_each_list_has_a_row_for_all_there_is():
