@@ -66,6 +66,8 @@ def test_none_takes_the_preset_s_value() -> None:
         ({"iterations": 0}, "iterations must be"),
         ({"iterations": 2.5}, "iterations must be"),
         ({"time_budget": -1.0}, "time_budget must be"),
+        ({"time_budget": 0}, "time_budget must be a number above 0"),
+        ({"time_budget": 2e9}, "time_budget must be .* at most 1e.09"),
         ({"time_budget": math.nan}, "time_budget must be"),
         ({"distortion_weight": -0.1}, "distortion_weight must be a number of at least 0"),
         ({"distortion": "authalic"}, "distortion must be one of conformal, isometric"),
