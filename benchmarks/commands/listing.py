@@ -25,16 +25,9 @@ def _add(table: Table, *texts: str) -> None:
 
 def suites() -> Table:
     """Each suite with its cases and methods, and how long it takes on one core, about."""
-    import dataclasses
-    from typing import Any, cast
-
-    from baselines import registry
     from benchmarks.cases.suites import SUITES
     from benchmarks.running.expectation import about, expectation
-
-    def parameters(spec: str) -> tuple[str, dict[str, Any]]:
-        name, method = registry.method(spec)
-        return name, dataclasses.asdict(cast("Any", method))
+    from benchmarks.running.planning import parameters
 
     table = _table("suite", "title", "cells", "one core", "download", "cases", "methods", "seeds")
     for suite in SUITES.values():
