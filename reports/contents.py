@@ -58,6 +58,7 @@ DISPLAY: dict[str, tuple[str, str]] = {
     "textured": ("Textured", ""),
     "fam": ("FAM", ""),
     "artist+slim": ("Artist's cut + SLIM", ""),
+    "seamster": ("Seamster + SLIM", ""),
     "automatic+slim": ("Automatic cut + SLIM", ""),
     "unwrap": ("Unwrap", "symmetric Dirichlet, one to one"),
     "parapoint+slim": ("Unwrap", "symmetric Dirichlet, one to one"),

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 import torch
 
-from baselines.neural.fam import FAM, FAMTrainer, repulsion
-from baselines.neural.nuvo import Nuvo, NuvoNetworks, NuvoTrainer, encoded
-from baselines.neural.training import surface_normals
+from baselines.neural.fam import FAM
+from baselines.neural.fam_training import FAMTrainer, repulsion
+from baselines.neural.method import surface_normals
+from baselines.neural.nuvo import Nuvo
+from baselines.neural.nuvo_training import NuvoNetworks, NuvoTrainer, encoded
 from parapoint import PointCloud
 from parapoint.errors import InputError
 from parapoint.learned.presets import Preset
