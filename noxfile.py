@@ -1,7 +1,6 @@
 """The project's commands: `nox` checks it, `nox -s bench` reproduces the tables."""
 
 import os
-import sys
 
 import nox
 
@@ -10,7 +9,7 @@ nox.options.sessions = ["lint", "types", "tests"]
 nox.options.reuse_existing_virtualenvs = True
 
 EXTRAS = ("uvatlas", "uvunwrap")
-"""Extras of pyproject.toml that `nox -s bench -- --with NAME` adds; NAME may be blender, too."""
+"""Extras of pyproject.toml that `nox -s bench -- --with NAME` adds."""
 
 
 def install(session: nox.Session, *extras: str) -> None:
@@ -51,25 +50,11 @@ def tests(session: nox.Session) -> None:
     )
 
 
-def blender(session: nox.Session) -> str:
-    """The interpreter of an environment that holds Blender and nothing else, made at need.
-
-    bpy pins an old numpy, and has wheels for these Pythons only (5.0.1 for 3.11, 5.2 for 3.13).
-    """
-    folder = session.cache_dir.absolute() / "blender"
-    interpreter = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
-    if not interpreter.exists():
-        pythons = ["--python", "3.11", "--python", "3.13"]
-        session.run_install(sys.executable, "-m", "virtualenv", *pythons, folder, external=True)
-    session.run_install(interpreter, "-m", "pip", "install", "bpy>=4.3", external=True)
-    return str(interpreter)
-
-
 @nox.session
 def bench(session: nox.Session) -> None:
     """Run a suite (default: paper) and write its report: `nox -s bench -- smoke`.
 
-    `--with blender` (or uvatlas, uvunwrap) first installs what these methods need.
+    `--with uvatlas` (or uvunwrap) first installs what these methods need.
     """
     arguments = list(session.posargs)
     wanted = []
@@ -77,17 +62,16 @@ def bench(session: nox.Session) -> None:
         place = arguments.index("--with")
         wanted += arguments[place + 1 : place + 2]
         del arguments[place : place + 2]
-    if unknown := set(wanted) - {"blender", *EXTRAS}:
-        session.error(f"--with takes blender, {', '.join(EXTRAS)}; not {', '.join(unknown)}")
-    install(session, *(name for name in wanted if name != "blender"))
-    environment = {"PARAPOINT_BLENDER": blender(session)} if "blender" in wanted else {}
+    if unknown := set(wanted) - {*EXTRAS}:
+        session.error(f"--with takes {', '.join(EXTRAS)}; not {', '.join(unknown)}")
+    install(session, *wanted)
     if not arguments or arguments[0].startswith("-"):
         arguments.insert(0, "paper")
     if "--out" not in arguments:
         arguments += ["--out", f"results/{arguments[0]}"]
     if "--jobs" not in arguments:  # two cells with a thread each end sooner than one with two
         arguments += ["--jobs", str(min(os.cpu_count() or 1, 8))]
-    session.run("python", "-m", "benchmarks", "run", *arguments, env=environment)
+    session.run("python", "-m", "benchmarks", "run", *arguments)
     session.run("python", "-m", "reports", arguments[arguments.index("--out") + 1])
 
 

@@ -33,6 +33,7 @@ METHODS: dict[str, str] = {
     "harmonic": "baselines.disks.harmonic:Harmonic",
     "mean_value": "baselines.disks.mean_value:MeanValue",
     "lscm": "baselines.disks.lscm:LSCM",
+    "abf": "baselines.disks.abf:ABF",
     "arap": "baselines.disks.arap:ARAP",
     "slim": "baselines.disks.slim:SLIM",
     "smith_schaefer": "baselines.disks.smith_schaefer:SmithSchaefer",
@@ -50,6 +51,7 @@ METHODS: dict[str, str] = {
     "meshlab_voronoi": "baselines.tools.meshlab:MeshLabVoronoi",
     "meshlab_triangles": "baselines.tools.meshlab:MeshLabTriangles",
     "unwrap": "parapoint.unwrapping.unwrap:Unwrap",
+    "seamster": "baselines.seamster:Seamster",
     "automatic+slim": "baselines.hybrid:AutomaticSLIM",
     "artist+slim": "baselines.hybrid:ArtistSLIM",
     "meshed": "baselines.meshed:Meshed",
@@ -81,6 +83,8 @@ class Description:
         parameters: its fields and their defaults, as source text; "" for none.
         deterministic: whether it promises the same map for the same seed: "yes", "no", or "by its
             parameters"; ", with as many threads" where it depends on their number.
+        environment: what it needs beyond the project's own packages, as pip reads it; a run makes
+            an environment that has it.
         licence: of what runs; "" where a plugin does not say (class attribute `licence`).
         citations: what to cite, as entries of BibTeX; a plugin's own is its attribute `citation`.
     """
@@ -89,6 +93,7 @@ class Description:
     requires: tuple[str, ...]
     parameters: dict[str, str]
     deterministic: str
+    environment: tuple[str, ...]
     licence: str
     citations: tuple[str, ...]
 
@@ -187,9 +192,10 @@ def describe(name: str) -> Description:
     summary = (kind.__doc__ or "").strip().split("\n", maxsplit=1)[0]
     promise = {True: "yes", False: "no"}.get(getattr(kind, "deterministic", True))
     promise = promise or "by its parameters"
-    if promise != "no" and _imported_by(kind.__module__, "torch"):
+    if promise != "no" and imports(kind, "torch"):
         promise += ", with as many threads"
-    return Description(summary, tuple(sorted(kind.requires)), parameters, promise, *credit(name))
+    requires = tuple(sorted(kind.requires))
+    return Description(summary, requires, parameters, promise, environment(kind), *credit(name))
 
 
 def credit(name: str) -> tuple[str, tuple[str, ...]]:
@@ -207,17 +213,25 @@ def credit(name: str) -> tuple[str, tuple[str, ...]]:
     return str(getattr(kind, "licence", "")), (citation,) if citation else ()
 
 
+def environment(made: Method | type[Method]) -> tuple[str, ...]:
+    """What a method needs beyond the project's own packages, as pip reads it."""
+    return getattr(made, "environment", ())
+
+
 def source_hash(made: Method) -> str:
     """Hash of what determines a method's results beside its parameters, the same on any machine.
 
     It covers the source of the method's module, of all that this one imports from this project or
     from its own package, and the versions of the libraries that the class names in `packages`.
-    Where the surface may be changed before the method sees it, it covers how.
+    In an environment of its own these may differ from what is installed here: there the run says
+    which versions it had. Where the surface may be changed before the method sees it, the hash
+    covers how.
     """
     modules = [type(made).__module__]
     if made.requires & REPAIRED:
         modules.append("parapoint.surfaces.preparation")
-    return sources.source_hash(*modules, packages=getattr(made, "packages", ()))
+    packages = () if environment(made) else getattr(made, "packages", ())
+    return sources.source_hash(*modules, packages=packages)
 
 
 def depends_on_threads(made: Method) -> bool:
@@ -229,13 +243,15 @@ def depends_on_threads(made: Method) -> bool:
     return imports(made, "torch")
 
 
-def imports(made: Method, package: str) -> bool:
-    """Whether a method's module imports a package, itself or through modules of this project."""
-    return _imported_by(type(made).__module__, package)
+def imports(made: Method | type[Method], package: str) -> bool:
+    """Whether a method names a package in `packages`, or its module has imported it.
 
-
-def _imported_by(module: str, package: str) -> bool:
-    """As `imports`, for a module by its name."""
+    The module may have done so itself or through modules of this project.
+    """
+    kind = made if isinstance(made, type) else type(made)
+    if package in getattr(kind, "packages", ()):
+        return True
+    module = kind.__module__
     own = {"parapoint", "baselines", module.partition(".")[0]}
     pending, seen = [module], set[str]()
     while pending:
@@ -372,5 +388,11 @@ def _method_class(module: ModuleType, class_name: str, where: str) -> type[Metho
         raise InputError(
             f"{class_name}.requires in {where} must be a frozenset of "
             f"{', '.join(sorted(REQUIREMENTS))}; it is {requires!r}"
+        )
+    needed = getattr(kind, "environment", ())
+    if not isinstance(needed, tuple) or not all(isinstance(one, str) and one for one in needed):
+        raise InputError(
+            f"{class_name}.environment in {where} must be a tuple of requirements as pip reads "
+            f"them; it is {needed!r}"
         )
     return cast("type[Method]", kind)

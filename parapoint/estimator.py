@@ -354,8 +354,10 @@ def load(folder: str | Path, *, device: str = "auto") -> Estimator:
         device: "auto", "cpu" or "cuda", for trained networks.
 
     Raises:
-        InputError: there is none, it is damaged, or of another version of the format.
+        InputError: there is none, it is damaged, or of another version of the format; there is no
+            such device.
     """
+    check_choice("device", device, ("auto", "cpu", "cuda"))
     arrays, facts = saving.read(Path(folder), "model")
     with saving.damage_of(Path(folder)):
         name = facts["estimator"]

@@ -16,6 +16,11 @@ class Method(Protocol):
     It may have a method `preload()`, called once before `parameterize` is timed: there it imports
     or starts what is slow to come, and raises MissingError where that is not installed.
 
+    It may have a class attribute `environment`, a tuple of requirements as pip reads them, such as
+    ("bpy>=4.3",): `python -m benchmarks run` makes an environment that has them, once, and runs the
+    method there. The module of the method is imported outside of it, too, so such packages are
+    imported in `preload` or `parameterize`.
+
     Attributes:
         requires: what the surface must be, words of `REQUIREMENTS`. Empty: a mesh or a point cloud.
     """

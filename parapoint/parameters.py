@@ -12,6 +12,8 @@ LARGEST_SEED = 2**63 - 1
 """Largest seed: what torch takes and a column of a table holds."""
 LONGEST_SECONDS = 1e9
 """Largest time, in seconds, that may be asked for: some thirty years."""
+MOST_MEMORY = 1e6
+"""Most memory, in GB, that may be asked for."""
 
 
 def check_whole(name: str, value: object, least: int, most: int | None = None) -> None:

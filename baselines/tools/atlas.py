@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pandas as pd
 
 from parapoint.planar.domains import FlatteningError
 from parapoint.surfaces.parameterization import Parameterization
@@ -69,13 +68,17 @@ def joined_corners(mesh: Mesh, uv: FloatArray) -> Parameterization:
 def row_numbers(*columns: npt.NDArray[Any]) -> IntArray:
     """(N,) a number for each distinct row of some columns (N,), 0, 1, ... as they first appear.
 
-    By hashing, which takes a tenth of the time of `np.unique(axis=0)`.
+    By one sort of all columns, which takes a fraction of the time of `np.unique(axis=0)`.
     """
-    number, _ = pd.factorize(columns[0], use_na_sentinel=False)
-    for column in columns[1:]:
-        code, values = pd.factorize(column, use_na_sentinel=False)
-        number, _ = pd.factorize(number * len(values) + code)
-    return np.asarray(number, dtype=np.int64)
+    order = np.lexsort(columns)  # stable: of equal rows the first one comes first
+    begins = np.ones(len(order), dtype=bool)
+    begins[1:] = np.logical_or.reduce([np.diff(column[order]) != 0 for column in columns])
+    first = order[begins]
+    number = np.empty(len(first), dtype=np.int64)
+    number[np.argsort(first)] = np.arange(len(first))
+    numbers = np.empty(len(order), dtype=np.int64)
+    numbers[order] = number[np.cumsum(begins) - 1]
+    return numbers
 
 
 def first_rows(number: IntArray) -> IntArray:

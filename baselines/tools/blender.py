@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import subprocess
+import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from shutil import which
@@ -21,11 +22,13 @@ from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, Surface
 
 INTERPRETER = "PARAPOINT_BLENDER"
-"""Environment variable that names a Python interpreter which can import bpy."""
+"""Environment variable that names a Python interpreter which can import bpy, where there is one."""
+ENVIRONMENT: tuple[str, ...] = () if os.environ.get(INTERPRETER) else ("bpy>=4.3",)
+"""What a run must install. There are wheels for a few versions of Python only."""
 SCRIPT = Path(__file__).with_name("blender_process.py")
 HOW = (
-    "nox -s bench -- --with blender does it all; or pip install bpy in an environment of its own "
-    f"and name that environment's python in {INTERPRETER}"
+    "python -m benchmarks run installs it in an environment of its own; "
+    f"or name a python that can import bpy in {INTERPRETER}"
 )
 
 
@@ -50,9 +53,7 @@ def started() -> Blender:
     Raises:
         MissingError: there is no such interpreter, or it has no Blender.
     """
-    interpreter = os.environ.get(INTERPRETER, "")
-    if not interpreter:
-        raise MissingError(f"needs Blender: {HOW}")
+    interpreter = os.environ.get(INTERPRETER) or sys.executable
     if which(interpreter) is None:
         raise MissingError(f"needs Blender: there is no program {interpreter}: {HOW}")
     process = subprocess.Popen(  # noqa: S603 (the user's own interpreter, our script)
@@ -98,10 +99,12 @@ def unwrapped(
 
 
 class Waiting:
-    """What the four methods share: Blender is started before the clock.
+    """What the four methods share: their environment, and that Blender starts before the clock.
 
     Of a surface that comes in several components the first one's start only: the others' count.
     """
+
+    environment: ClassVar[tuple[str, ...]] = ENVIRONMENT
 
     def preload(self) -> None:
         """Start the process that the next map will use.

@@ -18,6 +18,7 @@ SECONDS_PER_10000_FACES: dict[str, float] = {
     "mean_value": 0.1,
     "lscm": 0.033,
     "bff": 0.04,
+    "abf": 1.5,
     "arap": 0.4,
     "slim": 0.9,
     "smith_schaefer": 30.0,

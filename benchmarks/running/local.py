@@ -48,13 +48,20 @@ THREAD_VARIABLES = (
 class _Slot:
     """A supervisor process, and the task that it does, or will do once it is ready."""
 
-    def __init__(self, threads: int, modules: tuple[str, ...]) -> None:
-        """Start a supervisor that imports `modules` and whose cells may use `threads` threads."""
+    def __init__(self, threads: int, interpreter: str, modules: tuple[str, ...]) -> None:
+        """Start a supervisor.
+
+        Args:
+            threads: how many threads its cells may use.
+            interpreter: the Python that runs it, and them.
+            modules: what it imports.
+        """
+        self.interpreter = interpreter
         self.modules = modules
         self.replies, send = os.pipe()
         variables = dict.fromkeys(THREAD_VARIABLES, str(threads)) | {"PYTHONHASHSEED": "0"}
         self.process = subprocess.Popen(  # noqa: S603  our own module
-            [sys.executable, "-m", "benchmarks.running.worker", str(send), *modules],
+            [interpreter, "-m", "benchmarks.running.worker", str(send), *modules],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -198,14 +205,15 @@ class Local:
         return sum(slot.task is not None for slot in self.slots)
 
     def _assign(self, task: Task) -> None:
-        """Give a task to an idle supervisor that has its modules, or to a new one."""
+        """Give a task to an idle supervisor like the one it needs, or to a new one."""
         modules = () if task.modules in self.harmful else task.modules
         for slot in self.slots:
-            if slot.task is None and slot.modules == modules:
+            same = (slot.interpreter, slot.modules) == (task.interpreter, modules)
+            if slot.task is None and same:
                 slot.task = task
                 self._begin(slot, task)
                 return
-        slot = _Slot(self.threads, modules)
+        slot = _Slot(self.threads, task.interpreter, modules)
         slot.task = task
         self.slots.add(slot)
         self.selector.register(slot.replies, selectors.EVENT_READ, slot)
@@ -259,7 +267,7 @@ class Local:
             reason: why the task that it had begun fails, unless its time is over.
 
         Raises:
-            InputError: no supervisor comes to be ready, time after time.
+            InputError: no supervisor comes to be ready, time after time, in this environment.
         """
         self.slots.discard(slot)
         self.selector.unregister(slot.replies)
@@ -273,8 +281,14 @@ class Local:
             if slot.modules:
                 self.harmful.add(slot.modules)
             elif self.starts >= MOST_STARTS:
-                said = last_lines(slot.printed, lines=1)
-                raise InputError(f"no process can be started for a cell: {said}")
+                said = f"no process can be started for a cell: {last_lines(slot.printed, lines=1)}"
+                if slot.interpreter == sys.executable:
+                    raise InputError(said)
+                self.starts = 0
+                slot.task.ended(
+                    Outcome("failed", f"in its environment {said}"), self.folder / "none"
+                )
+                return
             self._assign(slot.task)
         elif time.monotonic() > slot.started + slot.time_limit:
             late = f"not done within the limit of {slot.time_limit:g} s, and hard to kill"

@@ -52,6 +52,7 @@ class Chosen:
         params: all its parameters.
         source_hash: hash of its source.
         modules: those of SLOW that it imports.
+        environment: what it needs in an environment of its own; empty where it runs in this one.
         counts_threads: whether its map depends on the number of threads.
     """
 
@@ -60,6 +61,7 @@ class Chosen:
     params: Mapping[str, object]
     source_hash: str
     modules: tuple[str, ...]
+    environment: tuple[str, ...] = ()
     counts_threads: bool = False
 
 
@@ -76,6 +78,16 @@ class Cell:
     row: ResultRow
     method: Chosen
     why: str
+
+
+def parameters(spec: str) -> tuple[str, dict[str, Any]]:
+    """The name of a method in the registry and all its parameters, as rows have them.
+
+    Raises:
+        InputError: the name or a parameter is unknown.
+    """
+    name, method = registry.method(spec)
+    return name, plain(dataclasses.asdict(cast("Any", method)))
 
 
 def choice(
@@ -99,7 +111,9 @@ def choice(
         params = plain(dataclasses.asdict(cast("Any", method)))
         modules = tuple(module for module in SLOW if registry.imports(method, module))
         counts = registry.depends_on_threads(method)
-        chosen.append(Chosen(spec, name, params, registry.source_hash(method), modules, counts))
+        needed = registry.environment(method)
+        version = registry.source_hash(method)
+        chosen.append(Chosen(spec, name, params, version, modules, needed, counts))
     asked = suite.cases if cases is None else cases
     names = tuple(dict.fromkeys(models.canonical_name(case) for case in asked))
     asked_seeds = suite.seeds if seeds is None else tuple(dict.fromkeys(seeds))

@@ -8,29 +8,30 @@ cell that has its row is done, and the same call goes on with the others.
 from __future__ import annotations
 
 import dataclasses
-import functools
+import sys
 import time
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from benchmarks.cases.suites import Suite
 from benchmarks.metrics.table import METRICS
-from benchmarks.running import environment, executors, planning, scoring, scratch
+from benchmarks.running import environment, environments, executors, planning, scoring, scratch
+from benchmarks.running.environments import Environment
 from benchmarks.running.planning import Cell, Chosen
 from benchmarks.running.tasks import Executor, Outcome, RunJob, Task
 from benchmarks.store import measuring, versions
 from benchmarks.store.results import Store
-from benchmarks.store.rows import ResultRow
-from parapoint.parameters import LONGEST_SECONDS, check_number, check_whole
+from benchmarks.store.rows import MISSING, ResultRow
+from parapoint.method import MissingError
+from parapoint.parameters import LONGEST_SECONDS, MOST_MEMORY, check_number, check_whole
 
 TIME_LIMIT = 1800.0
 """Wall time in seconds that a cell may take, where the user sets no other limit."""
 MOST_JOBS = 4096
 """Most cells that may be asked to run at a time."""
-MOST_MEMORY = 1e6
-"""Most memory, in GB, that a cell may be allowed to hold."""
 
 
 @dataclass
@@ -87,6 +88,9 @@ class Summary:
 
 class Progress:
     """What a run reports to while it goes on. This one says nothing; subclasses do."""
+
+    def installing(self, requirements: Sequence[str], folder: Path) -> None:
+        """An environment that methods need is about to be made."""
 
     def planned(self, summary: Summary) -> None:
         """The run knows which cells it has to do."""
@@ -163,20 +167,45 @@ def run(
         planning.mend(store, todo)
         progress.planned(summary)
         if todo:
+            made, refused = _environments(todo, progress, is_local=executor == "local")
+            here |= {"environments": {", ".join(key): made[key].versions for key in made}}
             number = store.add_run(here | versions.noted(suite.name))
             book = _Book(store, number, summary, progress)
             tasks = []
             for cell in todo:
-                if cell.row.surface_hash:
-                    job = _job(store, cell, plugins, timeout, memory_limit)
-                    tasks.append(book.task(cell, job))
-                else:
+                needed = cell.method.environment
+                if not cell.row.surface_hash:
                     book.write(cell, Outcome("skipped", summary.missing[cell.row.case]))
+                elif needed in refused:
+                    book.write(cell, Outcome("skipped", MISSING + refused[needed]))
+                else:
+                    job = _job(store, cell, plugins, timeout, memory_limit)
+                    python = str(made[needed].interpreter) if needed else sys.executable
+                    tasks.append(book.task(cell, job, python))
             workers.run(tasks, jobs)
         _measure(store, workers, None if executor == "local" else memory, summary, progress)
     summary.seconds = time.monotonic() - began
     summary.method_seconds /= jobs
     return summary
+
+
+def _environments(
+    todo: Sequence[Cell], progress: Progress, *, is_local: bool
+) -> tuple[dict[tuple[str, ...], Environment], dict[tuple[str, ...], str]]:
+    """The environments that some cells need, by requirements, and why others cannot be had."""
+    made, refused = {}, {}
+    wanted = [cell.method.environment for cell in todo if cell.row.surface_hash]
+    for needed in filter(None, dict.fromkeys(wanted)):
+        if not is_local:
+            refused[needed] = (
+                f"{', '.join(needed)}: environments are made by --executor local alone"
+            )
+            continue
+        try:
+            made[needed] = environments.made(needed, partial(progress.installing, needed))
+        except MissingError as error:
+            refused[needed] = str(error)
+    return made, refused
 
 
 def _measure(
@@ -234,8 +263,8 @@ class _Book:
         self.summary = summary
         self.progress = progress
 
-    def task(self, cell: Cell, job: RunJob) -> Task:
-        """The task that does `job` and writes the row of `cell`."""
+    def task(self, cell: Cell, job: RunJob, interpreter: str) -> Task:
+        """The task that does `job` by a Python and writes the row of `cell`."""
 
         def ended(outcome: Outcome, path: Path) -> None:
             self.summary.method_seconds += outcome.seconds or outcome.took
@@ -247,8 +276,8 @@ class _Book:
                     outcome = dataclasses.replace(outcome, status="failed", reason=reason)
             self.write(cell, outcome)
 
-        began = functools.partial(self.progress.started, cell)
-        return Task(job, began, ended, cell.method.modules)
+        began = partial(self.progress.started, cell)
+        return Task(job, began, ended, cell.method.modules, interpreter)
 
     def write(self, cell: Cell, outcome: Outcome) -> None:
         """Write the row of a cell."""

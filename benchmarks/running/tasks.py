@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -202,12 +203,14 @@ class Task:
         modules: packages that the supervisor imports before it forks, so that the job need not.
             Tasks with other modules get another supervisor: what a job finds in memory never
             depends on the jobs before it.
+        interpreter: the Python that runs the job.
     """
 
     job: Job
     began: Callable[[], None]
     ended: Callable[[Outcome, Path], None]
     modules: tuple[str, ...] = ()
+    interpreter: str = sys.executable
 
 
 class Executor(Protocol):

@@ -5,12 +5,12 @@ from __future__ import annotations
 import click
 
 from parapoint.files.decoding import allow
-from parapoint.parameters import check_number
+from parapoint.parameters import MOST_MEMORY, check_number
 
 
 def _allow(_: click.Context, __: click.Parameter, gigabytes: float | None) -> None:
     if gigabytes is not None:
-        check_number("--memory", gigabytes, above=True)
+        check_number("--memory", gigabytes, most=MOST_MEMORY, above=True)
         allow(gigabytes * 1e9)
 
 

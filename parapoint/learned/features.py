@@ -84,7 +84,7 @@ class GatedCut(nn.Module):
     """x + Φ([gates(x); features(x)]).
 
     A gate is tanh(SHARPNESS · side(x)) · max(0, reach(x) − FLOOR). One network makes `side`, whose
-    sign says on which bank of a seam x lies, and `reach`, which falls to 0 away from it and towards
+    sign says on which side of a seam x lies, and `reach`, which falls to 0 away from it and towards
     its ends. The slope of the tanh, which is nearly 0 or nearly infinite, is left out of tangents.
     """
 

@@ -21,6 +21,8 @@ CHOICES = {
     "start": ("hull", "computed"),
 }
 """What each setting in words may say."""
+LARGEST = 10**9
+"""Largest count or weight of a preset: steps of some thirty years, and no float32 overflows."""
 NUMBERS = (
     "perturbation",
     "unwrap_weight",
@@ -124,7 +126,7 @@ class Preset:
             ("subset", FEWEST_POINTS),
             ("iterations", 1),
         ):
-            check_whole(name, getattr(self, name), least)
+            check_whole(name, getattr(self, name), least, LARGEST)
         for name in ("patch", "starts", "embedding", "unwrap_neighbours", "anti_flip_neighbours"):
             check_whole(name, getattr(self, name), 1)
         for name in ("features", "gates"):
@@ -136,7 +138,7 @@ class Preset:
         for name in ("all_from", "warm_up"):
             check_number(name, getattr(self, name), most=1.0)
         for name in NUMBERS:
-            check_number(name, getattr(self, name))
+            check_number(name, getattr(self, name), most=LARGEST)
         if self.learning_rate is not None:
             check_number("learning_rate", self.learning_rate)
         if self.start == "computed" and self.branches == "2d":
@@ -206,7 +208,7 @@ LEARNED = Preset(
 
 - Networks: a smooth activation (a piecewise linear network has a piecewise constant Jacobian),
   Fourier features of their inputs, and gates in Cut, which can so open a surface at once.
-- Start: in place of the hull a computed map, whose values and derivatives, and the banks of whose
+- Start: in place of the hull a computed map, whose values and derivatives, and the sides of whose
   seams, the networks are taught (`parapoint.learned.start`, `parapoint.learned.taught`).
 - Losses: the conformal and the anti-flip term look at the map of the points (`unfolding_loss`)
   and not at that of the plane; areas count a little.

@@ -1,7 +1,7 @@
 """The start of `learned`: a computed map, written down so that networks can be taught it.
 
 The cloud is triangulated, cut open along short seams and flattened (`parapoint.computed`). Of this
-map the networks are shown values, derivatives, and on which bank of which seam a point lies; then
+map the networks are shown values, derivatives, and on which side of which seam a point lies; then
 they go on by themselves. Nothing of it stays in a fitted model.
 """
 
@@ -32,7 +32,7 @@ class Start(NamedTuple):
         frames: (2, N, 3) orthonormal tangent vectors, right-handed around normals that agree.
         gradients: (2, N, 3) of u and of v.
         offsets: (N, 2); the map near a point is u = gradients · x + offset.
-        gates: (N, G) for each seam 1 on its left bank, −1 on its right bank, and between these
+        gates: (N, G) for each seam 1 on its left side, −1 on its right side, and between these
             where the surface leads around the end of the seam or away from it.
     """
 
@@ -48,7 +48,7 @@ class Seam(NamedTuple):
     """A line along which a surface is cut open, between two ends or branchings of the cut.
 
     Attributes:
-        left, right: vertices of the cut surface on either bank.
+        left, right: vertices of the cut surface on its two sides, copies of the same ones.
     """
 
     left: IntArray
@@ -81,12 +81,12 @@ def computed_start(points: FloatArray, gates: int, deadline: float = math.inf) -
 def gate(disk: Mesh, seam: Seam) -> FloatArray:
     """(M,) the gate of a seam at the vertices of the cut surface.
 
-    Its size is the way around the end of the seam to its other bank, up to REACH, and falls to 0
+    Its size is the way around the end of the seam to its other side, up to REACH, and falls to 0
     between REACH and twice REACH from the seam.
     """
     graph = edge_graph(disk, edge_lengths(disk))
     to_left, to_right = (
-        csgraph.dijkstra(graph, indices=bank, min_only=True) for bank in (seam.left, seam.right)
+        csgraph.dijkstra(graph, indices=side, min_only=True) for side in (seam.left, seam.right)
     )
     around = np.nan_to_num(to_right - to_left, nan=0.0)
     away = 2 - np.minimum(to_left, to_right) / REACH
@@ -94,21 +94,21 @@ def gate(disk: Mesh, seam: Seam) -> FloatArray:
 
 
 def seams(flat: Flattened) -> list[Seam]:
-    """The seams of a cut surface; vertices that lie on both banks, its tips, belong to neither."""
-    banks: dict[tuple[int, int], list[int]] = {}
+    """The seams of a cut surface; vertices that lie on both sides, its tips, belong to neither."""
+    copies: dict[tuple[int, int], list[int]] = {}
     for start, end in flat.disk.halfedges[_on_boundary(flat.disk)].tolist():
-        banks[int(flat.origin[start]), int(flat.origin[end])] = [start, end]
-    cut = np.array([pair for pair in banks if pair[::-1] in banks and pair[0] < pair[1]])
+        copies[int(flat.origin[start]), int(flat.origin[end])] = [start, end]
+    cut = np.array([pair for pair in copies if pair[::-1] in copies and pair[0] < pair[1]])
     rim = flat.mesh.halfedges[_on_boundary(flat.mesh)]
     found = []
     for path in _paths(
         cut.reshape(-1, 2).astype(np.int64), np.unique(rim), len(flat.mesh.vertices)
     ):
         steps = list(itertools.pairwise(path))
-        left = {vertex for i, j in steps for vertex in banks[i, j]}
-        right = {vertex for i, j in steps for vertex in banks[j, i]}
+        left = {vertex for i, j in steps for vertex in copies[i, j]}
+        right = {vertex for i, j in steps for vertex in copies[j, i]}
         seam = Seam(
-            *(np.array(sorted(bank), dtype=np.int64) for bank in (left - right, right - left))
+            *(np.array(sorted(side), dtype=np.int64) for side in (left - right, right - left))
         )
         if len(seam.left) and len(seam.right):
             found.append(seam)

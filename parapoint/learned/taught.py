@@ -29,7 +29,7 @@ LEAST_STRETCH = 1e-2
 
 TERMS = ("map", "jacobian", "unfolding", "inverse", "cycle", "wrap")
 GATE_STEPS = 1_500
-"""Steps of the training of Cut's gates; after 1,000 no point was on the wrong bank of a seam."""
+"""Steps of the training of Cut's gates; after 1,000 no point was on the wrong side of a seam."""
 GATE_SHARE = 0.06
 """Share of the time budget after which that training ends."""
 GATE_POINTS = 384
@@ -42,7 +42,7 @@ already, and Deform follows it."""
 class TaughtTrainer(Trainer):
     """A trainer that begins with random networks and teaches them a start as it goes.
 
-    First the gates of Cut learn the banks of the seams. Then all else is trained at once: Cut and
+    First the gates of Cut learn the sides of the seams. Then all else is trained at once: Cut and
     Unwrap by the start's map, its derivatives along the surface, and the distortion of their own
     map; Wrap and Stitch to bring each point back; Deform to spread the lattice over the surface;
     all by the paper's cycles.

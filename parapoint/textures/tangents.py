@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
 
 from parapoint.surfaces.parameterization import Charted
-from parapoint.surfaces.surface import FloatArray, vertex_normals
+from parapoint.surfaces.surface import FloatArray, IntArray, vertex_normals
 from parapoint.textures.texels import Texels
 
 
@@ -16,7 +18,8 @@ def corner_tangents(charted: Charted, normals: FloatArray) -> tuple[FloatArray, 
 
     As MikkTSpace has them (Mikkelsen 2008, "Simulation of wrinkled surfaces revisited"), the
     convention of glTF: the direction in which u grows, laid into the plane of the vertex normal, is
-    averaged by angle over the faces that share a vertex, a uv and a handedness.
+    averaged by angle in that plane over the faces around a vertex that share its uv, edge by edge,
+    and a handedness.
 
     Args:
         charted: the mesh and its map.
@@ -29,17 +32,36 @@ def corner_tangents(charted: Charted, normals: FloatArray) -> tuple[FloatArray, 
     hand = np.where(du[:, 0] * dv[:, 1] - du[:, 1] * dv[:, 0] < 0, -1.0, 1.0)
     along = hand[:, None] * (first * dv[:, 1:] - second * du[:, 1:])
     normal = normals[mesh.faces]
-    tangents = _unit(along[:, None] - (normal * along[:, None]).sum(axis=2, keepdims=True) * normal)
-    before = _unit(np.roll(points, 1, axis=1) - points)
-    after = _unit(np.roll(points, -1, axis=1) - points)
+    tangents = _laid(along[:, None], normal)
+    before = _laid(np.roll(points, 1, axis=1) - points, normal)
+    after = _laid(np.roll(points, -1, axis=1) - points, normal)
     angle = np.arccos(np.clip((before * after).sum(axis=2, keepdims=True), -1, 1))
-    key = np.stack(
-        [mesh.faces, held.corners, np.broadcast_to(hand[:, None], mesh.faces.shape)], axis=2
-    )
-    _, group = np.unique(key.reshape(-1, 3), axis=0, return_inverse=True)
+    group = _fans(charted, hand)
     total = np.zeros((int(group.max()) + 1, 3))
-    np.add.at(total, group.reshape(-1), (angle * tangents).reshape(-1, 3))
-    return _unit(total[group.reshape(-1)].reshape(-1, 3, 3)), hand
+    np.add.at(total, group, (angle * tangents).reshape(-1, 3))
+    return _unit(total[group].reshape(-1, 3, 3)), hand
+
+
+def _fans(charted: Charted, hand: FloatArray) -> IntArray:
+    """(3 F,) the fan of faces that each corner belongs to.
+
+    Faces next to one another are of one fan where they share both ends of their edge, in space and
+    in the plane, and their handedness (F,).
+    """
+    faces = charted.mesh.faces
+    key = np.stack([faces, charted.map.corners, np.broadcast_to(hand[:, None], faces.shape)], 2)
+    place = np.unique(key.reshape(-1, 3), axis=0, return_inverse=True)[1].reshape(-1)
+    corner = np.arange(faces.size)
+    ahead = np.roll(corner.reshape(-1, 3), -1, axis=1).reshape(-1)
+    ends = np.stack([corner, ahead], axis=1)
+    ends = np.where((place < place[ahead])[:, None], ends, ends[:, ::-1])
+    order = np.lexsort(place[ends].T)
+    ends = ends[order]
+    same = (place[ends[1:]] == place[ends[:-1]]).all(axis=1)
+    one, other = ends[1:][same].reshape(-1), ends[:-1][same].reshape(-1)
+    size = (len(corner), len(corner))
+    joined = sparse.coo_matrix((np.ones(len(one), bool), (one, other)), size)
+    return np.asarray(csgraph.connected_components(joined, directed=False)[1], dtype=np.int64)
 
 
 def in_tangent_space(shown: Texels) -> Callable[[FloatArray, slice], FloatArray]:
@@ -65,6 +87,11 @@ def in_tangent_space(shown: Texels) -> Callable[[FloatArray, slice], FloatArray]
         return _unit(inside)
 
     return seen
+
+
+def _laid(vectors: FloatArray, normals: FloatArray) -> FloatArray:
+    """Vectors laid into the planes of unit normals, of length 1."""
+    return _unit(vectors - (normals * vectors).sum(axis=-1, keepdims=True) * normals)
 
 
 def _unit(vectors: FloatArray) -> FloatArray:

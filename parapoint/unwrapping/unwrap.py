@@ -15,7 +15,7 @@ from parapoint.computed.parts import DISTORTIONS, towards_conformal
 from parapoint.computed.reconstruction import ReconstructionError
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
-from parapoint.parameters import check_choice, check_number
+from parapoint.parameters import LONGEST_SECONDS, check_choice, check_number
 from parapoint.planar.coarse import LARGE, grown_as_coarse
 from parapoint.planar.descent import LEAST_ENERGY, Run, sound
 from parapoint.planar.embedding import embeddable
@@ -87,7 +87,7 @@ class Unwrap:
         if self.price is not None:
             check_number("price", self.price)
         if self.time_budget is not None:
-            check_number("time_budget", self.time_budget, above=True)
+            check_number("time_budget", self.time_budget, most=LONGEST_SECONDS, above=True)
         if self.max_distortion is not None:
             check_number("max_distortion", self.max_distortion, LEAST_ENERGY, above=True)
         check_choice("distortion", self.distortion, DISTORTIONS)

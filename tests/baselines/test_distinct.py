@@ -13,6 +13,7 @@ DISK_METHODS = [
     "mean_value",
     "lscm",
     "bff",
+    "abf",
     "arap",
     "smith_schaefer",
     "geometry_image",

@@ -28,7 +28,7 @@ def test_a_texture_is_read_bilinearly_at_the_nearest_place() -> None:
 
 def test_the_bake_of_today_takes_the_nearest_colour() -> None:
     points = np.array([[0.2, 0.5, 0.0], [0.9, 0.5, 0.0]])
-    colours = np.array([[9, 0, 0], [0, 7, 0]], dtype=np.uint8)
+    colours = np.array([[200, 0, 255], [0, 127, 0]], dtype=np.uint8)
     pixels = nearest_baked(PLATE, PointCloud(points, attributes={"colours": colours}), 20)
     assert (pixels[:, :11] == colours[0]).all()
     assert (pixels[:, 11:] == colours[1]).all()
@@ -47,6 +47,7 @@ def test_ours_reads_back_better_than_the_nearest_colour() -> None:
     assert made.report["held_out"] == pytest.approx(600, abs=60)
     seen = cloud.points[seen_points(3000, 0)]
     assert made.report["bake_psnr"] > 30
+    assert made.report["charts"] == 1
     rows = np.flatnonzero(~np.isin(cloud.points[:, 0], seen[:, 0]))
     nearest = nearest_baked(PLATE, PointCloud(seen, attributes={"colours": colours_at(seen)}), 128)
     wrong = looked_up(PLATE, nearest, cloud.points[rows]) - wave_colours(cloud.points[rows], 5.0)

@@ -15,6 +15,7 @@ from parapoint.planar.domains import (
     Domain,
     FlatteningError,
     domain,
+    far_pair,
     frames,
     is_kept,
     signed_areas,
@@ -29,6 +30,7 @@ DISK_METHODS = [
     "mean_value",
     "lscm",
     "bff",
+    "abf",
     "arap",
     "smith_schaefer",
     "geometry_image(side=9)",
@@ -409,3 +411,13 @@ def test_a_start_whose_energy_has_no_number_is_no_minimum():
     # Where nothing pulls, as on a triangle mapped to itself, the slope is 0 and it is one.
     one = domain(Mesh([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
     assert is_minimum("conformal", np.ones(1), frames(one), one.vertices[:, :2], one.faces)
+
+
+def test_lscm_lays_its_far_vertices_on_the_first_axis_from_the_origin():
+    mesh = rolled(flat_disk())
+    disk = domain(mesh)
+    one, other = far_pair(disk.vertices[disk.loop])
+    first, second = mapped("lscm", mesh).uv[disk.loop[[one, other]]]
+    assert_allclose(first, 0, atol=1e-9)
+    assert second[1] == pytest.approx(0, abs=1e-9)
+    assert second[0] > 1

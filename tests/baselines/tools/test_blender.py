@@ -1,5 +1,6 @@
 """Blender's methods by a stand-in for bpy, and with Blender where PARAPOINT_BLENDER names it."""
 
+import importlib.util
 import json
 import os
 import stat
@@ -137,8 +138,9 @@ def test_mesh_that_blender_does_not_take_is_skipped(stand_in):
 def test_without_blender_it_is_said_how_to_get_it(name, monkeypatch):
     method = registry.method(name)[1]
     monkeypatch.delenv(blender.INTERPRETER, raising=False)
-    with pytest.raises(MissingError, match="nox -s bench -- --with blender"):
-        method.preload()
+    if importlib.util.find_spec("bpy") is None:
+        with pytest.raises(MissingError, match="benchmarks run installs it in an environment"):
+            method.preload()
     monkeypatch.setenv(blender.INTERPRETER, "/nowhere/python")
     with pytest.raises(MissingError, match="there is no program /nowhere/python"):
         method.parameterize(irregular_disk(), seed=0)

@@ -36,6 +36,7 @@ def test_the_suites():
         "noise",
         "cuts",
         "neural",
+        "field",
         "gpu",
         "bake",
     }
@@ -139,3 +140,10 @@ def test_sets_are_those_of_the_registry():
         assert sets[name] == {name}
     assert sets["cuts"] == {"artist", "closed", "genus"}
     assert sets["core"] == {"paper", "disk", "closed", "genus", "cad", "artist"}
+
+
+def test_the_field_has_equal_budgets():
+    budgets = [parameters(spec).get("time_budget") for spec in SUITES["field"].methods]
+    assert {budget for budget in budgets if budget} == {60.0}
+    assert len([budget for budget in budgets if budget]) >= 7
+    assert SUITES["field"].cases == (*SUITES["paper"].cases, "camelhead")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -153,8 +154,8 @@ def test_a_process_that_a_method_forks_counts_and_writes_no_map(tmp_path, monkey
 class FakeSlot:
     """A supervisor that is not there: two pipes, and whatever it is made to say."""
 
-    def __init__(self, _: int, modules: tuple[str, ...]) -> None:
-        self.modules = modules
+    def __init__(self, _: int, interpreter: str, modules: tuple[str, ...]) -> None:
+        self.interpreter, self.modules = interpreter, modules
         (self.replies, self.voice), (self.output, self.printer) = os.pipe(), os.pipe()
         os.set_blocking(self.replies, False)
         os.set_blocking(self.output, False)
@@ -185,24 +186,30 @@ def hands(tmp_path, monkeypatch):
         yield hands
 
 
-def task(outcomes: list[Outcome], modules: tuple[str, ...] = ()) -> Task:
+def task(
+    outcomes: list[Outcome], modules: tuple[str, ...] = (), interpreter: str = sys.executable
+) -> Task:
     job = MeasureJob(surface=Path("s"), uv=Path("u"), time_limit=9.0, memory_limit=1e9)
-    return Task(job, lambda: None, lambda outcome, _: outcomes.append(outcome), modules)
+    return Task(
+        job, lambda: None, lambda outcome, _: outcomes.append(outcome), modules, interpreter
+    )
 
 
-def test_a_supervisor_does_tasks_of_its_own_modules_only(hands):
+def test_a_supervisor_does_tasks_of_its_own_modules_and_interpreter_only(hands):
     outcomes: list[Outcome] = []
-    for modules in [(), ("torch",), ()]:
-        hands._assign(task(outcomes, modules))
+    here = sys.executable
+    kinds = [((), here), (("torch",), here), ((), "other/python"), ((), here), ((), "other/python")]
+    for modules, interpreter in kinds:
+        hands._assign(task(outcomes, modules, interpreter))
         (slot,) = [slot for slot in hands.slots if slot.task is not None]
-        assert slot.modules == modules
+        assert (slot.modules, slot.interpreter) == (modules, interpreter)
         if not slot.ready:
             slot.says(to_json(Ready()))
             hands._listen()
         slot.says(to_json(Outcome("ok", number=hands.sent)))
         hands._listen()
-    assert len(hands.slots) == 2
-    assert [outcome.status for outcome in outcomes] == ["ok"] * 3
+    assert len(hands.slots) == 3
+    assert [outcome.status for outcome in outcomes] == ["ok"] * 5
 
 
 def test_an_outcome_counts_only_once_the_supervisor_is_ready(hands):

@@ -1,4 +1,4 @@
-"""The start from a computed map: what it says of the map, and on which bank a point lies."""
+"""The start from a computed map: what it says of the map, and on which side a point lies."""
 
 import numpy as np
 import pytest
@@ -37,16 +37,16 @@ def slit(side: int = 41) -> Flattened:
     )
 
 
-def test_a_slit_has_two_banks_that_meet_at_its_tip() -> None:
+def test_a_slit_has_two_sides_that_meet_at_its_tip() -> None:
     flat = slit()
     (seam,) = seams(flat)
-    banks = [flat.disk.vertices[bank] for bank in seam]
-    for bank in banks:
-        assert_allclose(np.sort(bank[:, 0]), np.arange(20) / 40)
-        assert_allclose(bank[:, 1], 0.5)
+    both = [flat.disk.vertices[side] for side in seam]
+    for side in both:
+        assert_allclose(np.sort(side[:, 0]), np.arange(20) / 40)
+        assert_allclose(side[:, 1], 0.5)
     sides = []
-    for bank in seam:
-        faces = flat.disk.faces[np.isin(flat.disk.faces, bank).any(axis=1)]
+    for side in seam:
+        faces = flat.disk.faces[np.isin(flat.disk.faces, side).any(axis=1)]
         sides.append(flat.disk.vertices[faces][:, :, 1].mean() - 0.5)
     assert sides[0] * sides[1] < 0
 
@@ -61,7 +61,15 @@ def test_a_gate_jumps_across_the_slit_and_nowhere_else() -> None:
     i, j = flat.disk.edges.T
     steps = np.linalg.norm(flat.disk.vertices[i] - flat.disk.vertices[j], axis=1)
     assert (np.abs(values[i] - values[j]) <= 3.01 * steps / REACH).all()
+    # Beside the slit, k edges from its tip, the way to the other side is k edges back and one on.
+    for side, sign in zip(seam, (1, -1), strict=True):
+        steps_to_tip = 20 - 40 * flat.disk.vertices[side, 0]
+        assert_allclose(values[side], sign * np.minimum((steps_to_tip + 1) / 40 / REACH, 1))
     x, y = flat.disk.vertices[:, :2].T
+    # Straight above the slit's left end the gate is 1 up to REACH, and falls to 0 at twice that.
+    above = (x == 0) & (y > 0.5)
+    far = (y[above] - 0.5) / REACH
+    assert_allclose(np.abs(values[above]), np.clip(2 - far, 0, 1), atol=1e-9)
     assert_allclose(values[(x >= 0.5) & (y == 0.5)], 0, atol=1e-9)
     assert_allclose(values[np.abs(y - 0.5) > 2 * REACH], 0)
 

@@ -126,8 +126,8 @@ def test_arrays_are_copied_and_read_only():
     [
         ([[0, 0, np.nan], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], "vertices must be finite; row 0"),
         ([[0, 0, 0], [1, 0, np.inf], [0, 1, 0]], [[0, 1, 2]], "vertices must be finite; row 1"),
-        (CORNERS, [[0, 1, 4]], "vertices run from 0 to 3"),
-        (CORNERS, [[0, 1, -1]], "vertices run from 0 to 3"),
+        (CORNERS, [[0, 1, 3], [0, 1, 4]], r"face 1 is \[0, 1, 4\], but vertices run from 0 to 3"),
+        (CORNERS, [[0, 1, 3], [0, 1, -1], [4, 1, 2]], r"face 1 is .* vertices run from 0 to 3"),
         (CORNERS, np.zeros((0, 3)), "at least one face"),
         (CORNERS, [[0, 1]], r"faces must have shape \(n, 3\)"),
         (np.zeros((4, 2)), TETRAHEDRON, r"vertices must have shape \(n, 3\)"),
@@ -171,3 +171,9 @@ def test_vertex_normals_are_means_by_area():
     normals = vertex_normals(mesh)
     both = np.array([0, 1, 3]) / np.sqrt(10)
     assert normals == pytest.approx(np.array([both, both, [0, 0, 1], [0, 1, 0]]))
+
+
+def test_halfedges_run_around_each_face_from_its_first_corner():
+    mesh = Mesh(np.random.default_rng(0).normal(size=(4, 3)), [[0, 1, 2], [3, 2, 1]])
+    wanted = [[0, 1], [1, 2], [2, 0], [3, 2], [2, 1], [1, 3]]
+    np.testing.assert_array_equal(mesh.halfedges, wanted)

@@ -1,6 +1,7 @@
 """Tangents of a map, and normals seen in tangent space, with known answers."""
 
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
 
 from parapoint import Mesh, Parameterization
@@ -11,9 +12,11 @@ from parapoint.textures.texels import texels
 UP = np.array([0.0, 0, 1])
 
 
-def test_tangents_are_averaged_by_angle() -> None:
-    """Two flat faces: u grows along x in the first, along (1, −1) in the second."""
+@pytest.mark.parametrize("heights", [[0.0, 0, 0, 0], [0.3, -2, 1, 5]])
+def test_tangents_are_averaged_by_angle_in_the_plane_of_the_normal(heights) -> None:
+    """Two faces: u grows along x in the first, along (1, −1) in the second, as seen from above."""
     points = np.array([[0.0, 0, 0], [0, 1, 0], [1, 0, 0], [-1, 1, 0]])
+    points[:, 2] = heights
     faces = np.array([[0, 2, 1], [0, 1, 3]])
     uv = np.array([[0.0, 0], [0, 1], [1, 0], [-1, 0]])
     charted = Charted(Mesh(points, faces), Parameterization(uv, faces))
@@ -28,6 +31,16 @@ def test_tangents_are_averaged_by_angle() -> None:
         for face in range(2):
             at = int(np.flatnonzero(faces[face] == corner)[0])
             assert_allclose(tangents[face, at], mean / np.linalg.norm(mean), atol=1e-12)
+
+
+def test_faces_that_touch_in_a_vertex_alone_have_tangents_of_their_own() -> None:
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0], [-1, -1, 0]])
+    faces = np.array([[0, 1, 2], [0, 3, 4]])
+    uv = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1], [-1, 1]])  # the second is turned by −90°
+    charted = Charted(Mesh(points, faces), Parameterization(uv, faces))
+    tangents, _ = corner_tangents(charted, np.tile(UP, (5, 1)))
+    assert_allclose(tangents[0], np.tile([1.0, 0, 0], (3, 1)), atol=1e-12)
+    assert_allclose(tangents[1], np.tile([0.0, 1, 0], (3, 1)), atol=1e-12)
 
 
 def test_a_mirrored_map_keeps_the_direction_in_which_v_grows() -> None:

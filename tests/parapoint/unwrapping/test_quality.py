@@ -98,3 +98,28 @@ def test_overlap_is_seen_wherever_one_chart_lies_on_another(second, overlap) -> 
     points[8:] = np.pad(SQUARE, ((0, 0), (0, 1))) + 9
     found = quality(Charted(Mesh(points, faces), Parameterization(uv, faces)), 64)
     assert found.overlap == overlap
+
+
+def test_the_least_part_is_the_one_that_hangs_together() -> None:
+    """Two starved islands, in the middle of a sheet and at its rim, are two parts, not one.
+
+    Each is a twentieth of the surface. The first keeps a tenth of its fair area, the second a
+    fifth; faces that touch at an edge are one part, whichever corner the edge begins at.
+    """
+    x = np.array([0.0, 0.45, 0.5, 0.95, 1.0])
+    width = np.diff(x)
+    kept = width * [1, 0.1, 1, 0.2]
+    at = np.concatenate([[0], np.cumsum(kept)])
+    points = np.array([[a, b, 0] for a in x for b in (0, 1)])
+    uv = np.array([[a, b] for a in at for b in (0.0, 1)])
+    for turn in range(3):
+        faces = np.array(
+            [
+                np.roll(f, turn)
+                for k in range(0, 8, 2)
+                for f in ([k, k + 2, k + 3], [k, k + 3, k + 1])
+            ]
+        )
+        found = quality(Charted(Mesh(points, faces), Parameterization(uv, faces)), 64)
+        assert found.smallest_part == pytest.approx(0.1 / kept.sum())
+        assert found.starved == pytest.approx(0.1)

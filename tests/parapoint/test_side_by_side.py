@@ -1,0 +1,144 @@
+"""A fitted map and several beside one another, with maps known by hand."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from parapoint.fitting import Fitted, Progress, Session
+from parapoint.side_by_side import GAP, fitted_side_by_side, joined, side_by_side
+from parapoint.surfaces.frame import Frame
+from parapoint.surfaces.parameterization import Charted, Parameterization
+from parapoint.surfaces.surface import Mesh, PointCloud
+
+SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+FACES = np.array([[0, 1, 2], [0, 2, 3]])
+
+
+class Dropped:
+    """Drops z, and draws all out along u by `stretch`."""
+
+    def __init__(self, stretch=1.0, mesh=None):
+        self.stretch, self.mesh = stretch, mesh
+
+    def flatten(self, points):
+        return points[:, :2] * [self.stretch, 1]
+
+    def lift(self, uv):
+        return np.column_stack([uv / [self.stretch, 1], np.zeros(len(uv))])
+
+    def charted(self):
+        if self.mesh is None:
+            return None
+        return Charted(self.mesh, Parameterization(self.flatten(self.mesh.vertices), FACES))
+
+    def arrays(self):
+        return {"stretch": np.array([self.stretch])}
+
+    def facts(self):
+        return {"stretch": self.stretch}
+
+
+def fitted(points, stretch=1.0, mesh=None, **facts):
+    """A fitted map of points in a frame of its own: its centre, and half of its largest extent."""
+    frame = Frame(points.mean(axis=0), float(np.ptp(points, axis=0).max()) / 2)
+    return Fitted(Dropped(stretch, mesh), frame, points, (), {"seconds": 0.25, **facts})
+
+
+@pytest.mark.parametrize("unit", [1.0, 1000.0])
+def test_a_map_is_in_the_unit_of_the_surface_and_back(unit):
+    points = unit * (SQUARE + np.array([7, 8, 9]))
+    made = fitted(points, 2.0)
+    uv = made.flatten(points)
+    assert_allclose(uv, unit * (SQUARE[:, :2] - 0.5) * [2, 1])
+    assert_allclose(made.lift(uv), points)
+
+
+def test_the_mesh_of_a_map_is_where_the_surface_is():
+    points = 10 * SQUARE + [5, 0, 3]
+    inside = Mesh((points - points.mean(axis=0)) / 5, FACES)
+    held = fitted(points, 2.0, inside).charted()
+    assert_allclose(held.mesh.vertices, points)
+    assert_allclose(held.map.uv, 10 * (SQUARE[:, :2] - 0.5) * [2, 1])
+    assert fitted(points).charted() is None
+
+
+def test_maps_stand_from_left_to_right_a_gap_apart_their_feet_on_one_line():
+    # Squares of sides 1 and 4, the second drawn out to a width of 8.
+    parts = [fitted(SQUARE, iterations=3), fitted(4 * SQUARE + [10, 0, 5], 2.0, iterations=4)]
+    whole = side_by_side(parts)
+    gap = GAP * 8
+    first, second = whole.flatten(SQUARE), whole.flatten(4 * SQUARE + [10, 0, 5])
+    assert_allclose(first, SQUARE[:, :2], atol=1e-12)
+    assert_allclose(second, 4 * SQUARE[:, :2] * [2, 1] + [1 + gap, 0], atol=1e-12)
+    # Each place is lifted by the map that it is in, or nearest to.
+    assert_allclose(whole.lift(second), 4 * SQUARE + [10, 0, 5], atol=1e-12)
+    assert_allclose(whole.lift(first), SQUARE, atol=1e-12)
+    near = np.array([[1 + 0.4 * gap, 0.5], [1 + 0.6 * gap, 0.5]])
+    assert_allclose(whole.lift(near)[:, 2], [0, 5], atol=1e-12)
+    assert whole.report["components"] == 2
+    assert (whole.report["points"], whole.report["iterations"]) == (8, 7)
+    assert whole.report["seconds"] == 0.5
+    assert "iterations" not in side_by_side([fitted(SQUARE), fitted(SQUARE)]).report
+
+
+def test_the_state_of_several_maps_names_the_component():
+    parts = [fitted(SQUARE), fitted(4 * SQUARE + [10, 0, 5], 2.0)]
+    whole = side_by_side(parts).map
+    arrays, facts = whole.arrays(), whole.facts()["components"]
+    assert_array_equal(arrays["label"], [0, 0, 0, 0, 1, 1, 1, 1])
+    assert_array_equal(arrays["component1.stretch"], [2.0])
+    assert_allclose(arrays["high"] - arrays["low"], [[1, 1], [8, 4]])
+    assert [of["scale"] for of in facts] == [0.5, 2.0]
+    assert facts[1]["centre"] == [12, 2, 5]
+    assert facts[1]["facts"] == {"stretch": 2.0}
+    assert facts[0]["map"] == "Dropped"
+
+
+def test_meshes_are_joined_only_where_all_maps_have_one():
+    inside = Mesh(2 * SQUARE - [1, 1, 0], FACES)
+    one, two = fitted(SQUARE, 1.0, inside), fitted(SQUARE + np.array([3, 0, 0]), 1.0, inside)
+    held = side_by_side([one, two]).charted()
+    assert_allclose(held.mesh.vertices, np.concatenate([SQUARE, SQUARE + np.array([3, 0, 0])]))
+    assert_array_equal(held.mesh.faces, [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
+    assert_allclose(np.ptp(held.map.uv[4:], axis=0), [1, 1])
+    assert held.map.uv[4:, 0].min() == pytest.approx(1 + GAP)
+    assert side_by_side([one, fitted(SQUARE)]).charted() is None
+
+
+def test_joined_meshes_count_vertices_and_rows_apart():
+    torn = Parameterization(np.arange(12.0).reshape(6, 2), [[0, 1, 2], [3, 4, 5]])
+    whole = Parameterization(SQUARE[:, :2], FACES)
+    made = joined([Charted(Mesh(SQUARE, FACES), of) for of in (torn, whole, torn)])
+    assert_array_equal(made.mesh.faces[2:4], FACES + 4)
+    assert_array_equal(made.map.corners[2:4], FACES + 6)
+    assert_array_equal(made.map.corners[4:], [[10, 11, 12], [13, 14, 15]])
+    assert len(made.map.uv) == 16
+
+
+def test_each_part_has_the_share_of_its_size_and_a_checkpoint_of_its_own(tmp_path):
+    told = []
+
+    def strategy(part, share, session):
+        told.append((len(part.points), share, session.checkpoint, session.watched))
+        if session.checkpoint is not None:
+            session.checkpoint.mkdir(parents=True)
+        return fitted(part.points)
+
+    session = Session(checkpoint=tmp_path, watched=SQUARE)
+    parts = [PointCloud(SQUARE), PointCloud(np.concatenate([SQUARE, 2 * SQUARE, 3 * SQUARE]))]
+    fitted_side_by_side(strategy, parts, session)
+    assert told == [
+        (4, 0.25, tmp_path / "component-0", None),
+        (12, 0.75, tmp_path / "component-1", None),
+    ]
+    assert list(tmp_path.iterdir()) == []  # empty folders do not stay
+    told.clear()
+    fitted_side_by_side(strategy, parts[:1], Session(watched=SQUARE))
+    assert told[0][:3] == (4, 1.0, None)
+    assert told[0][3] is SQUARE
+
+
+def test_a_session_is_told_nothing_by_default_and_compares_without_points():
+    Session().tell(Progress("training"))
+    assert Session(watched=SQUARE) == Session(watched=2 * SQUARE)
+    assert Session().of_component(3).checkpoint is None
