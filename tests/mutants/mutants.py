@@ -61,7 +61,7 @@ TALK = frozenset({"print", "echo", "secho", "debug", "info", "warning", "fail", 
 LOOKS = frozenset(
     {"digits", "figsize", "fontsize", "linewidth", "markersize", "zorder", "copy", "strict"}
 )
-"""Keywords whose values are not changed: how a table or a figure looks; `copy=`, `strict=` of zip."""
+"""Keywords whose values are not changed: the looks of tables and figures, `copy=`, `strict=`."""
 DRAWS = frozenset({"default_rng", "manual_seed", "Random"})
 """Functions whose arguments are seeds: another is as good."""
 ABOUT = 10
