@@ -13,15 +13,16 @@ from scipy.spatial import cKDTree
 from parapoint.fitting import Fitted, Session, Strategy, SurfaceMap, placed
 from parapoint.surfaces.frame import IDENTITY, Frame
 from parapoint.surfaces.parameterization import Charted, Parameterization
+from parapoint.surfaces.preparation import shelves
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, Surface
 
 GAP = 0.02
-"""Distance between neighbouring charts, in widths of the widest."""
+"""Least distance between neighbouring charts, in widths of the widest."""
 
 
 @dataclass(frozen=True, eq=False)
 class SideBySide:
-    """A map of each of K components; their charts stand in a row, apart, all in the surface's unit.
+    """A map of each of K components; their charts stand apart on shelves, in the surface's unit.
 
     A point is mapped by the component whose fitted points it is nearest to, a point of the plane
     by the chart whose box it is nearest to.
@@ -140,13 +141,12 @@ def side_by_side(parts: Sequence[Fitted]) -> Fitted:
     """One fitted map of the components of a surface.
 
     Args:
-        parts: the fitted components, one chart each, from left to right.
+        parts: the fitted components, one chart each; they are set on shelves, the highest first.
     """
     charts = [part.flatten(part.points) for part in parts]
     low = np.array([uv.min(axis=0) for uv in charts])
     size = np.array([np.ptp(uv, axis=0) for uv in charts])
-    width = size[:, 0] + GAP * size[:, 0].max()
-    places = np.stack([np.cumsum(width) - width, np.zeros(len(parts))], axis=1)
+    places = shelves(size + GAP * size[:, 0].max())
     points = np.concatenate([part.points for part in parts])
     label = np.repeat(np.arange(len(parts)), [len(part.points) for part in parts])
     whole = SideBySide(
