@@ -39,7 +39,7 @@ def _said(value: object) -> str:
 
 def check_choice(name: str, value: object, choices: Collection[str]) -> None:
     """Raise InputError unless `value` is one of `choices`."""
-    if value not in choices:
+    if not isinstance(value, str) or value not in choices:
         raise InputError(f"{name} must be one of {', '.join(choices)}, not {_said(value)}")
 
 
