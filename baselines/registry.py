@@ -194,7 +194,7 @@ def describe(name: str) -> Description:
     summary = (kind.__doc__ or "").strip().split("\n", maxsplit=1)[0]
     promise = {True: "yes", False: "no"}.get(getattr(kind, "deterministic", True))
     promise = promise or "by its parameters"
-    if promise != "no" and _imported_by(kind.__module__, "torch"):
+    if promise != "no" and imports(kind, "torch"):
         promise += ", with as many threads"
     requires = tuple(sorted(kind.requires))
     return Description(summary, requires, parameters, promise, environment(kind), *credit(name))
@@ -245,13 +245,15 @@ def depends_on_threads(made: Method) -> bool:
     return imports(made, "torch")
 
 
-def imports(made: Method, package: str) -> bool:
-    """Whether a method's module imports a package, itself or through modules of this project."""
-    return _imported_by(type(made).__module__, package)
+def imports(made: Method | type[Method], package: str) -> bool:
+    """Whether a method names a package in `packages`, or its module has imported it.
 
-
-def _imported_by(module: str, package: str) -> bool:
-    """As `imports`, for a module by its name."""
+    The module may have done so itself or through modules of this project.
+    """
+    kind = made if isinstance(made, type) else type(made)
+    if package in getattr(kind, "packages", ()):
+        return True
+    module = kind.__module__
     own = {"parapoint", "baselines", module.partition(".")[0]}
     pending, seen = [module], set[str]()
     while pending:

@@ -183,8 +183,8 @@ def _shown_run(suite: Suite, out: Path, **options: Any) -> Summary:
 @click.argument("what", type=click.Choice(["suites", "cases", "methods", "metrics"]))
 def list_(what: str) -> None:
     """Show what there is: a table on a terminal, tab-separated values in a pipe."""
-    from benchmarks.commands.display import print_table
-    from benchmarks.commands.listing import LISTS, entries
+    from benchmarks.commands.listing import LISTS
+    from benchmarks.commands.tables import entries, print_table
 
     print_table(LISTS[what](), entries)
 
@@ -246,10 +246,10 @@ for name, place, summary in (
 )
 def speed(figure: Path | None, race: str | None, seconds: float) -> None:
     """How fast the heavy parts are, measured now: metrics, methods, and ParaPoint's training."""
-    from benchmarks.commands.display import print_table
     from benchmarks.commands.method_speed import overhead_table, overheads
     from benchmarks.commands.metric_speed import growth_figure, metric_costs, metric_table
     from benchmarks.commands.speed import training_table
+    from benchmarks.commands.tables import print_table
 
     if race is not None:
         from benchmarks.checks.straightforward import race_table

@@ -1,27 +1,13 @@
-"""What the neural rivals share: training data, the run, the map at the surface's points."""
+"""What the trainings of the neural rivals share."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
-from typing import ClassVar
-
-import igl
-import numpy as np
 import torch
-from scipy.spatial import cKDTree
 
-from parapoint.errors import InputError
 from parapoint.learned.networks import SurfaceNetworks
 from parapoint.learned.presets import Preset
 from parapoint.learned.trainer import Trainer
-from parapoint.surfaces.parameterization import Parameterization, PointParameterization, TracePoint
-from parapoint.surfaces.sampling import training_points
-from parapoint.surfaces.surface import FloatArray, Mesh, Surface
-
-BATCH = 4_096
-"""Points mapped at a time."""
-KEPT_MAPS = 8
-"""Maps kept in the trace."""
+from parapoint.surfaces.surface import FloatArray
 
 
 class SurfaceTrainer(Trainer):
@@ -57,105 +43,3 @@ class SurfaceTrainer(Trainer):
     def new_networks(self, generator: torch.Generator) -> SurfaceNetworks:
         """Networks to train, their weights drawn from `generator`."""
         raise NotImplementedError
-
-
-@dataclass(frozen=True)
-class NeuralMethod:
-    """A map R³ → R² learned for one surface; base class of the rivals.
-
-    Attributes:
-        points: training points, drawn as for ParaPoint.
-        iterations: steps.
-        subset: points of a step, at most; see `Trainer` on time budgets.
-        time_budget: seconds of training at most; the schedule follows the time where that ends
-            sooner.
-    """
-
-    points: int = 10_000
-    iterations: int = 10_000
-    subset: int = 10_000
-    time_budget: float | None = None
-
-    requires: ClassVar[frozenset[str]] = frozenset()
-    packages: ClassVar[tuple[str, ...]] = ("torch",)
-    schedule: ClassVar[Preset] = Preset(all_from=1.0, warm_up=0.0, perturbation=0.0)
-    trainer: ClassVar[type[SurfaceTrainer]]
-
-    def __post_init__(self) -> None:
-        for name in ("points", "iterations", "subset"):
-            if getattr(self, name) < 1:
-                raise InputError(f"{name} must be at least 1, not {getattr(self, name)}")
-        if self.time_budget is not None and not self.time_budget > 0:
-            raise InputError(f"time_budget must be a number of seconds, not {self.time_budget}")
-
-    @property
-    def deterministic(self) -> bool:
-        """Whether the same seed gives the same map: not where time ends the run, nor on CUDA."""
-        return self.time_budget is None and not torch.cuda.is_available()
-
-    def parameterize(
-        self, surface: Surface, *, seed: int
-    ) -> Parameterization | PointParameterization:
-        """The map at the vertices of a mesh or the points of a cloud, in the unit of the surface.
-
-        Raises:
-            InputError: fewer than 100 distinct points, or all on a line.
-            DivergedError: the training diverged, and again with a smaller step.
-        """
-        cloud = training_points(surface, self.points, seed)
-        centre = (cloud.min(axis=0) + cloud.max(axis=0)) / 2
-        scale = float(np.linalg.norm(cloud - centre, axis=1).max())
-        budget = {k: v for k, v in asdict(self).items() if k != "time_budget"}
-        trainer = self.trainer(
-            (cloud - centre) / scale,
-            surface_normals(surface, cloud),
-            replace(self.schedule, **budget),
-            seed=seed,
-            time_budget=self.time_budget,
-        )
-        everywhere = surface.vertices if isinstance(surface, Mesh) else surface.points
-        at = torch.as_tensor((everywhere - centre) / scale, dtype=torch.float32)
-
-        def uv() -> FloatArray:
-            with torch.no_grad():
-                parts = [
-                    trainer.networks.parameterization(part.to(trainer.device)).cpu()
-                    for part in torch.split(at, BATCH)
-                ]
-            return scale * torch.cat(parts).numpy().astype(np.float64)
-
-        trace: list[TracePoint] = []
-        kept = 0
-        for step in trainer.run():
-            if step.losses:
-                is_due = step.progress * KEPT_MAPS >= kept + 1
-                kept += is_due
-                map_now = uv() if is_due else None
-                trace.append(TracePoint(step.iteration, step.seconds, step.losses, map_now))
-        report: dict[str, object] = {
-            "points": len(cloud),
-            "points_of_a_step": min(trainer.subset, len(cloud)),
-            "iterations": trainer.iteration,
-            "weights": trainer.weights,
-            "losses": dict(trace[-1].values),
-            "divergences": trainer.divergences,
-            "device": trainer.device,
-        }
-        if isinstance(surface, Mesh):
-            return Parameterization(uv(), surface.faces, tuple(trace), report)
-        return PointParameterization(uv(), tuple(trace), report)
-
-
-def surface_normals(surface: Surface, at: FloatArray) -> FloatArray | None:
-    """(N, 3) unit normals of the surface at points (N, 3) of it; None where a cloud has none.
-
-    Those of the nearest vertex or point.
-    """
-    if isinstance(surface, Mesh):
-        points = surface.vertices[surface.referenced]
-        normals = igl.per_vertex_normals(surface.vertices, surface.faces)[surface.referenced]
-    elif surface.normals is not None:
-        points, normals = surface.points, surface.normals
-    else:
-        return None
-    return np.asarray(normals[cKDTree(points).query(at)[1]], dtype=np.float64)

@@ -329,7 +329,7 @@ def table(found: Sequence[Move]) -> Table:
 @click.pass_context
 def main(ctx: click.Context, /, *, update: bool) -> None:
     """Compare the metric values of every deterministic method with the golden ones."""
-    from benchmarks.commands.display import print_table
+    from benchmarks.commands.tables import print_table
 
     allowed = {comparison.name: tolerances(comparison) for comparison in COMPARISONS}
     found: list[Move] = []

@@ -12,13 +12,13 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from rich.console import RenderableType
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
 from rich.table import Column, Table
 from rich.text import Text
 
+from benchmarks.commands.tables import print_table
 from benchmarks.metrics.grades import GRADES, grade_of
 from benchmarks.metrics.table import METRICS
 from benchmarks.running.expectation import about, cell_seconds, clock, remaining
@@ -226,26 +226,6 @@ def print_summary(summary: Summary) -> None:
 def _say(line: str) -> None:
     """Print a line with names from elsewhere in it."""
     print(printable(line, LONGEST_MESSAGE), flush=True)
-
-
-def print_table(table: Table, drawn: Callable[[Table], RenderableType] | None = None) -> None:
-    """Print a table: drawn on a terminal, and as tab-separated lines anywhere else.
-
-    Args:
-        table: the table.
-        drawn: makes of it what a terminal shows; the table itself if None.
-    """
-    console = terminal()
-    if console.is_terminal:
-        console.print(table if drawn is None else drawn(table))
-        return
-    if table.title:
-        print(table.title)
-    print("\t".join(str(column.header) for column in table.columns))
-    cells = [[str(cell) for cell in column.cells] for column in table.columns]
-    for line in zip(*cells, strict=True):
-        print("\t".join(line))
-    sys.stdout.flush()
 
 
 def _by_method(summary: Summary) -> dict[str, list[ResultRow]]:

@@ -4,15 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from rich.console import Group
-from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
 from parapoint.errors import InputError
-
-SHORT = 20
-"""Characters of a fact that shares a line with others on a terminal."""
 
 
 def _table(*columns: str) -> Table:
@@ -23,36 +18,6 @@ def _table(*columns: str) -> Table:
     return table
 
 
-def entries(table: Table) -> Group:
-    """A table as a terminal of any width can show it: an entry for each row, under its name.
-
-    Short facts share the first line with the name; each long one has lines of its own.
-    """
-    headings = [str(column.header) for column in table.columns]
-    rows = list(
-        zip(*([str(cell) for cell in column.cells] for column in table.columns), strict=True)
-    )
-    is_long = [max(map(len, cells), default=0) > SHORT for cells in zip(*rows, strict=True)]
-    shown: list[Text | Padding] = []
-    for name, *facts in rows:
-        named = [
-            Text.assemble((f"{heading}: ", "dim"), fact)
-            for heading, fact in zip(headings[1:], facts, strict=True)
-        ]
-        short = [
-            text
-            for text, fact, long in zip(named, facts, is_long[1:], strict=True)
-            if fact and not long
-        ]
-        shown.append(Text.assemble((name, "bold"), "   " * bool(short), Text("; ").join(short)))
-        shown += [
-            Padding(text, (0, 0, 0, 4))
-            for text, fact, long in zip(named, facts, is_long[1:], strict=True)
-            if fact and long
-        ]
-    return Group(*shown)
-
-
 def _add(table: Table, *texts: str) -> None:
     """Add a row of texts, in which rich must not take brackets for markup."""
     table.add_row(*map(Text, texts))
@@ -60,16 +25,9 @@ def _add(table: Table, *texts: str) -> None:
 
 def suites() -> Table:
     """Each suite with its cases and methods, and how long it takes on one core, about."""
-    import dataclasses
-    from typing import Any, cast
-
-    from baselines import registry
     from benchmarks.cases.suites import SUITES
     from benchmarks.running.expectation import about, expectation
-
-    def parameters(spec: str) -> tuple[str, dict[str, Any]]:
-        name, method = registry.method(spec)
-        return name, dataclasses.asdict(cast("Any", method))
+    from benchmarks.running.planning import parameters
 
     table = _table("suite", "title", "cells", "one core", "download", "cases", "methods", "seeds")
     for suite in SUITES.values():

@@ -80,6 +80,16 @@ class Cell:
     why: str
 
 
+def parameters(spec: str) -> tuple[str, dict[str, Any]]:
+    """The name of a method in the registry and all its parameters, as rows have them.
+
+    Raises:
+        InputError: the name or a parameter is unknown.
+    """
+    name, method = registry.method(spec)
+    return name, plain(dataclasses.asdict(cast("Any", method)))
+
+
 def choice(
     suite: Suite,
     methods: Sequence[str] | None,

@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import monotonic
 
-from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, ProgressColumn, Task, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
+from rich.text import Text
 
 from parapoint.console import terminal
 from parapoint.fitting import Progress
@@ -39,11 +40,11 @@ def bar() -> Iterator[Tell]:
         BarColumn(bar_width=20),
         TimeElapsedColumn(),
         TextColumn("{task.fields[loss]}"),
-        TextColumn("{task.fields[remaining]}"),
+        _TimeLeft(),
     )
     with Bar(*columns, console=shown, disable=not shown.is_terminal) as progress:
         # While nobody can tell the end, as while a map is computed, the bar pulses.
-        task = progress.add_task("start", total=None, loss="", remaining="")
+        task = progress.add_task("start", total=None, loss="", end=None)
         phase, begun = "", 0.0
 
         def advance(now: Progress) -> None:
@@ -59,9 +60,17 @@ def bar() -> Iterator[Tell]:
                 completed=now.fraction or 0.0,
                 total=None if now.fraction is None else 1.0,
                 description=now.phase,
-                remaining="" if remaining is None else f"{remaining:.0f} s left",
+                end=None if remaining is None else monotonic() + remaining,
             )
             if now.losses:
                 progress.update(task, loss=f"loss {now.losses['total']:.4f}")
 
         yield advance
+
+
+class _TimeLeft(ProgressColumn):
+    """The seconds to the time at which a task is thought to end, where there is one."""
+
+    def render(self, task: Task) -> Text:
+        end: float | None = task.fields["end"]
+        return Text("" if end is None else f"{max(0.0, end - monotonic()):.0f} s left")

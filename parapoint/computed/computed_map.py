@@ -11,7 +11,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from parapoint.computed.flattening import FlatMap, flat_map
+from parapoint.computed.flattening import FlatMap, Say, flat_map
 from parapoint.computed.interpolation import Anchors, InterpolatedMap
 from parapoint.computed.parts import DISTORTIONS, Distortion
 from parapoint.computed.reconstruction import ReconstructionError
@@ -97,15 +97,19 @@ class ComputedMap(Estimator):
             ReconstructionError: the points show no surface that can be followed and flattened.
         """
         begun = time.monotonic()
-        session.tell(Progress("computing a map"))
         count = max(FEWEST_POINTS, round(self.points * share))
         budget = None if self.time_budget is None else self.time_budget * share
         deadline = math.inf if budget is None else begun + DESCENDING * budget
+
+        def say(phase: str) -> None:
+            left = None if budget is None else max(0.0, begun + budget - time.monotonic())
+            session.tell(Progress(phase, remaining=left))
+
         if budget is None:
-            drawn = _computed(surface, count, self, deadline)
+            drawn = _computed(surface, count, self, deadline, say)
         else:
             few = min(count, max(FEWEST_POINTS, round(TRIAL_PER_SECOND * budget)))
-            drawn = _computed_within(surface, few, count, self, deadline)
+            drawn = _computed_within(surface, few, count, self, deadline, say=say)
         flat, cloud = _as_the_normals(drawn.flat, drawn, surface), drawn.cloud
         if len(flat.missed):
             logger.warning(
@@ -174,16 +178,16 @@ def _as_the_normals(flat: FlatMap, drawn: _Drawn, surface: Surface) -> FlatMap:
     return flat.turned() if agreement.sum() < 0 else flat
 
 
-def _computed(surface: Surface, count: int, of: ComputedMap, deadline: float) -> _Drawn:
+def _computed(surface: Surface, count: int, of: ComputedMap, deadline: float, say: Say) -> _Drawn:
     """The map of at most `count` points of a surface."""
     points = training_points(surface, count, of.seed)
     frame = Frame.of(points)
     cloud = without_coincident(frame.inside(points))
-    return _Drawn(points, frame, cloud, flat_map(cloud, deadline, of.distortion))
+    return _Drawn(points, frame, cloud, flat_map(cloud, deadline, of.distortion, say))
 
 
 def _computed_within(
-    surface: Surface, few: int, most: int, of: ComputedMap, deadline: float
+    surface: Surface, few: int, most: int, of: ComputedMap, deadline: float, *, say: Say
 ) -> _Drawn:
     """The map of as many points, up to `most`, as the time up to `deadline` allows.
 
@@ -193,7 +197,7 @@ def _computed_within(
     before = time.monotonic()
     first: _Drawn | None = None
     try:
-        first = _computed(surface, few, of, deadline)
+        first = _computed(surface, few, of, deadline, say)
     except ReconstructionError as error:
         fault = error
     now = time.monotonic()
@@ -202,7 +206,7 @@ def _computed_within(
     # Where the surface has no more points than the first map took, there is nothing to add.
     if count > few and (first is None or len(first.points) == few):
         try:
-            second = _computed(surface, count, of, deadline)
+            second = _computed(surface, count, of, deadline, say)
         except ReconstructionError as error:
             logger.warning("no map of %d points could be computed: %s", count, error)
             fault = error

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -106,8 +107,19 @@ class Flattened(NamedTuple):
         return _chosen_copies(self.disk, self.origin)
 
 
+Say = Callable[[str], None]
+"""Is called with what is being done, in a word, when it begins."""
+
+
+def unheard(_: str) -> None:
+    """What is called where nobody wants to know."""
+
+
 def flattened(
-    points: FloatArray, deadline: float = math.inf, distortion: Distortion = "conformal"
+    points: FloatArray,
+    deadline: float = math.inf,
+    distortion: Distortion = "conformal",
+    say: Say = unheard,
 ) -> Flattened:
     """Distinct points (N, 3) triangulated, cut and flattened; see `flat_map`.
 
@@ -117,7 +129,7 @@ def flattened(
     """
     lines = thinned(points)
     try:
-        return _flattened(points, lines, deadline, distortion)
+        return _flattened(points, lines, deadline, distortion, say)
     except ReconstructionError as error:
         if lines is None:
             raise
@@ -128,9 +140,10 @@ def flattened(
 
 
 def _flattened(
-    points: FloatArray, lines: Lines | None, deadline: float, distortion: Distortion
+    points: FloatArray, lines: Lines | None, deadline: float, distortion: Distortion, say: Say
 ) -> Flattened:
     """See `flattened`; `lines` are the scan lines of the points, where there are any."""
+    say("reconstructing")
     rows = np.arange(len(points)) if lines is None else lines.rows
     mesh, is_denoised = _still(points[rows], lines)
     reached = np.flatnonzero(mesh.referenced)
@@ -144,7 +157,9 @@ def _flattened(
     mesh = Mesh(mesh.vertices[reached], row[mesh.faces])
     begun = time.monotonic()
     try:
+        say("cutting")
         disk = seamed(mesh, distortion, begun + SEAM_SHARE * (deadline - begun))
+        say("flattening")
         uv = bijective_map(disk, _layout(disk), deadline)
         disk, uv = parts_kept(disk, uv, distortion, deadline)
     except (RuntimeError, np.linalg.LinAlgError) as error:  # a singular factor, no bijection
@@ -155,7 +170,10 @@ def _flattened(
 
 
 def flat_map(
-    points: FloatArray, deadline: float = math.inf, distortion: Distortion = "conformal"
+    points: FloatArray,
+    deadline: float = math.inf,
+    distortion: Distortion = "conformal",
+    say: Say = unheard,
 ) -> FlatMap:
     """A map of distinct points (N, 3), worse where `deadline` ends the descents.
 
@@ -163,11 +181,12 @@ def flat_map(
         points: the cloud.
         deadline: no descent takes a step after this time of `time.monotonic`.
         distortion: what the map keeps, see `parapoint.computed.parts`.
+        say: is told what is being done.
 
     Raises:
         ReconstructionError: the points show no surface that can be followed and flattened.
     """
-    flat = flattened(points, deadline, distortion)
+    flat = flattened(points, deadline, distortion, say)
     chosen = flat.chosen()
     jacobians = flat.jacobians()[chosen]
     boundary = [int((of.edge_face_count == 1).sum()) for of in (flat.mesh, flat.disk)]

@@ -118,7 +118,7 @@ def write_glb(path: str | Path, charted: Charted, texture: npt.NDArray[np.uint8]
     """Write a textured mesh as binary glTF 2, the texture inside.
 
     Positions are of single precision there, so they are written around the middle of the mesh,
-    and the node carries it to its place.
+    and the node carries it to its place. A mesh with a boundary shows both of its sides.
 
     Raises:
         OSError: the file cannot be written; nothing is left behind.
@@ -130,7 +130,12 @@ def write_glb(path: str | Path, charted: Charted, texture: npt.NDArray[np.uint8]
     split = _Split.of(charted)
     middle = (split.points.min(axis=0) + split.points.max(axis=0)) / 2
     picture = Image.fromarray(texture)
-    material = PBRMaterial(baseColorTexture=picture, metallicFactor=0.0, roughnessFactor=1.0)  # type: ignore[no-untyped-call]  # trimesh's
+    material = PBRMaterial(  # type: ignore[no-untyped-call]  # trimesh's
+        baseColorTexture=picture,
+        metallicFactor=0.0,
+        roughnessFactor=1.0,
+        doubleSided=bool((charted.mesh.edge_face_count == 1).any()),
+    )
     mesh = trimesh.Trimesh(
         split.points - middle,
         split.faces,

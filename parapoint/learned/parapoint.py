@@ -8,25 +8,21 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
-import torch
-
-from parapoint.computed.reconstruction import ReconstructionError
 from parapoint.estimator import Estimator
 from parapoint.fitting import Fitted, Progress, Session
 from parapoint.learned import presets
-from parapoint.learned.checkpoint import Checkpoint, identity
+from parapoint.learned.devices import device_of
 from parapoint.learned.presets import Preset
-from parapoint.learned.start import computed_start
-from parapoint.learned.taught import TaughtTrainer
-from parapoint.learned.trained_map import TrainedMap, device_of, threads
-from parapoint.learned.trainer import Step, Trainer
 from parapoint.parameters import check_whole
 from parapoint.surfaces.frame import Frame
 from parapoint.surfaces.parameterization import TracePoint
 from parapoint.surfaces.sampling import FEWEST_POINTS, training_points, without_coincident
 from parapoint.surfaces.surface import FloatArray, Surface
+
+if TYPE_CHECKING:
+    from parapoint.learned.trainer import Step, Trainer
 
 logger = logging.getLogger("parapoint")
 
@@ -113,7 +109,8 @@ class ParaPoint(Estimator):
         """See `Estimator`."""
         super().check()
         self.numbers()
-        device_of(self.device)
+        if self.device != "auto":
+            device_of(self.device)
         if self.threads is not None:
             check_whole("threads", self.threads, 1, MOST_THREADS)
 
@@ -135,6 +132,8 @@ class ParaPoint(Estimator):
         Raises:
             DivergedError: the training diverged, and again with a smaller step.
         """
+        from parapoint.learned.trained_map import TrainedMap, threads
+
         begun = time.monotonic()
         preset = self.numbers()
         count = max(FEWEST_POINTS, round(preset.points * share))
@@ -159,6 +158,11 @@ class ParaPoint(Estimator):
 
         Where no map can be computed the hull is the start.
         """
+        from parapoint.computed.reconstruction import ReconstructionError
+        from parapoint.learned.start import computed_start
+        from parapoint.learned.taught import TaughtTrainer
+        from parapoint.learned.trainer import Trainer
+
         device = device_of(self.device)
         found: dict[str, object] = {"start": preset.start}
         if preset.start == "computed":
@@ -187,6 +191,9 @@ class ParaPoint(Estimator):
         begun: float,
     ) -> tuple[TracePoint, ...]:
         """Train to the end; the trace has the losses, and maps of the points that are watched."""
+        from parapoint.learned.checkpoint import Checkpoint, identity
+        from parapoint.learned.trained_map import TrainedMap
+
         trace: tuple[TracePoint, ...] = ()
         checkpoint = None
         if session.checkpoint is not None:
@@ -216,6 +223,8 @@ class ParaPoint(Estimator):
         return trace
 
     def _report(self, trainer: Trainer, trace: tuple[TracePoint, ...]) -> dict[str, object]:
+        import torch
+
         preset = trainer.preset
         used = len(trainer.shape.points)
         return {

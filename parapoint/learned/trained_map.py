@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from parapoint.errors import InputError
+from parapoint.learned.devices import device_of
 from parapoint.learned.features import FeatureNetworks
 from parapoint.learned.networks import ACTIVATIONS, Networks, SubNetworks, SurfaceNetworks
 from parapoint.learned.presets import Preset
@@ -92,20 +93,6 @@ def new_networks(preset: Preset, generator: torch.Generator) -> SubNetworks:
         of = preset.features, preset.gates
         return FeatureNetworks(*sizes, *of, activation=activation, generator=generator)
     return Networks(*sizes, activation, generator)
-
-
-def device_of(name: str) -> str:
-    """The device of a name: "auto" is CUDA where there is any.
-
-    Raises:
-        InputError: there is no such device.
-    """
-    if name not in ("auto", "cpu", "cuda"):
-        raise InputError(f"device must be auto, cpu or cuda, not {name!r}")
-    available = torch.cuda.is_available()
-    if name == "cuda" and not available:
-        raise InputError("device cuda: none is available; take auto or cpu")
-    return "cuda" if available and name != "cpu" else "cpu"
 
 
 @contextmanager

@@ -367,8 +367,8 @@ def _methods_of(suite: str) -> set[tuple[str, str]]:
     """Name and parameters of each method that a suite names; none for a suite of a user's own."""
     if suite not in SUITES:
         return set()
-    _, chosen = planning.choice(SUITES[suite], None, (), None, ())
-    return {(method.name, json.dumps(method.params, sort_keys=True)) for method in chosen}
+    named = map(planning.parameters, SUITES[suite].methods)
+    return {(name, json.dumps(values, sort_keys=True)) for name, values in named}
 
 
 def _spec(label: Label) -> str:

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from benchmarks.store import merging
+from benchmarks.store import measuring, merging
+from benchmarks.store.results import Store
 from parapoint.errors import InputError
 from reports import citing
 from reports.contents import contents
@@ -92,7 +93,17 @@ def _folders(sources: Sequence[Path]) -> Iterator[tuple[list[Path], Path]]:
             folders.append(folder)
         joined = Path(name) / "joined"
         merging.merge(folders[::-1], joined)
+        _hand_on_metrics(folders, Store(joined))
         yield folders, joined
+
+
+def _hand_on_metrics(folders: Sequence[Path], joined: Store) -> None:
+    """Compute only those metrics of the joined results that no folder knows already."""
+    known: dict[str, dict[str, float]] = {}
+    for folder in folders:
+        known |= measuring.values_by_key(measuring.stored_table(Store(folder)))
+    keys = measuring.metrics_keys(joined, joined.rows())
+    measuring.metrics(joined, {row: known[key] for row, key in keys.items() if key in known})
 
 
 def _history(sources: Sequence[Path], folders: Sequence[Path], out: Path) -> list[str]:

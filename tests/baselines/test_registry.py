@@ -289,6 +289,9 @@ def test_fields_that_are_no_arguments_are_left_out(monkeypatch):
 
 
 PARAMETERS = {
+    "abf": {"iterations": 30},
+    "geometry_image": {"side": 257},
+    "smith_schaefer": {"iterations": 5000, "time_budget": None},
     "arap": {"iterations": 100},
     "slim": {"energy": "symmetric_dirichlet", "iterations": 20},
     "xatlas": {

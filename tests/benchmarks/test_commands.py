@@ -261,6 +261,19 @@ def test_lists_are_tables_of_tab_separated_lines_in_a_pipe(what, capsys):
     assert first.get(what, "angle_difference_mean") in {line.split("\t")[0] for line in lines}
 
 
+@pytest.mark.parametrize("what", ["suites", "methods"])
+def test_lists_make_methods_without_torch(what):
+    code = (
+        "import sys; from benchmarks import __main__ as m\n"
+        f"try: m.main(['list', {what!r}])\n"
+        "except SystemExit: pass\n"
+        "print('loaded', {'torch', 'pandas'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "parapoint" in done.stdout
+    assert done.stdout.endswith("loaded set()\n")
+
+
 def test_score_prints_json_and_nothing_else(tmp_path, capsys):
     lines = ["v 0 0 0", "v 1 0 0", "v 0 1 0", "vt 0 0", "vt 1 0", "vt 0 1", "f 1/1 2/2 3/3"]
     (tmp_path / "map.obj").write_text("\n".join(lines) + "\n")

@@ -58,8 +58,12 @@ FAMILIES = {
 TALK = frozenset({"print", "echo", "secho", "debug", "info", "warning", "fail", "InputError"})
 """Functions whose arguments are words for a reader."""
 
-LOOKS = frozenset({"strict", "digits", "figsize", "fontsize", "linewidth", "markersize", "zorder"})
-"""Keywords whose values are not changed: how a table or a figure looks, and `strict=` of zip."""
+LOOKS = frozenset(
+    {"digits", "figsize", "fontsize", "linewidth", "markersize", "zorder", "copy", "strict"}
+)
+"""Keywords whose values are not changed: the looks of tables and figures, `copy=`, `strict=`."""
+DRAWS = frozenset({"default_rng", "manual_seed", "Random"})
+"""Functions whose arguments are seeds: another is as good."""
 ABOUT = 10
 """A limit that a constant names, of at least so much, might be one more or less as well."""
 
@@ -90,6 +94,8 @@ def ignored(source: str) -> list[tuple[Position, Position]]:
             found += [node] if name in TALK else []
             found += [key for key in node.keywords if key.arg in LOOKS]
             found += [one for one in node.args if name == "reshape" and is_rest(one)]
+            found += node.args[1:] if name == "round" else []
+            found += node.args if name in DRAWS else []
         elif isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING":
             found.append(node)
         elif isinstance(node, ast.arg | ast.AnnAssign):
@@ -143,8 +149,16 @@ def sample(chance: random.Random, package: str) -> Iterator[tuple[Path, int, str
         line = chance.choice(sorted(found))
         name, occurrence = chance.choice(found[line][chance.choice(sorted(found[line]))])
         changed = mutate_code(source, get_operator(f"core/{name}")(), occurrence)
-        if changed is not None and ast.dump(ast.parse(changed)) != ast.dump(ast.parse(source)):
+        if changed is not None and is_another(changed, source):
             yield path.relative_to(ROOT), line, name, changed
+
+
+def is_another(changed: str, source: str) -> bool:
+    """Whether a changed source is Python still (`not a := b` is not) and another program."""
+    try:
+        return ast.dump(ast.parse(changed)) != ast.dump(ast.parse(source))
+    except SyntaxError:
+        return False
 
 
 def stages(copy: Path, module: Path) -> list[list[str]]:

@@ -7,7 +7,7 @@ pytest.importorskip("cosmic_ray")
 from cosmic_ray.mutating import mutate_code
 from cosmic_ray.plugins import get_operator
 
-from .mutants import mutants
+from .mutants import is_another, mutants
 
 SOURCE = '''"""Not 1 + 1."""
 import os as o
@@ -17,6 +17,11 @@ def f(x: int | None = 2, *, y: float) -> int | str:
     if not x:
         raise ValueError(f"{1 + 1} is not {2 * y}")
     return zip(*x, y and -x, strict=True)
+MOST: int = 50
+LEAST = 9 * [0.5, 12]
+if TYPE_CHECKING:
+    import g
+column = f(x.reshape(-1, 3), digits=2, figsize=(3, 4)), round(y, 2), default_rng(0)
 '''
 
 
@@ -32,7 +37,7 @@ def changed():
     }
 
 
-def test_code_is_changed_and_words_hints_and_decorators_are_not():
+def test_code_is_changed_but_not_what_is_words_or_looks_or_as_good_another_way():
     assert {(line, "".join(text.split())) for line, text in changed()} == {
         (4, "deff(x:int|None=3,*,y:float)->int|str:"),
         (4, "deff(x:int|None=1,*,y:float)->int|str:"),
@@ -41,4 +46,17 @@ def test_code_is_changed_and_words_hints_and_decorators_are_not():
         (6, "ifnotnotx:"),
         (8, "returnzip(*x,yor-x,strict=True)"),
         (8, "returnzip(*x,yandx,strict=True)"),
+        (10, "LEAST=10*[0.5,12]"),
+        (10, "LEAST=8*[0.5,12]"),
+        (10, "LEAST=9/[0.5,12]"),
+        (10, "LEAST=9*[1.5,12]"),
+        (10, "LEAST=9*[-0.5,12]"),
+        (13, "column=f(x.reshape(-1,4),digits=2,figsize=(3,4)),round(y,2),default_rng(0)"),
+        (13, "column=f(x.reshape(-1,2),digits=2,figsize=(3,4)),round(y,2),default_rng(0)"),
     }
+
+
+def test_a_change_that_is_no_python_or_no_change_is_left_out():
+    assert is_another("x = 2", "x = 1")
+    assert not is_another("x = (1)", "x = 1")
+    assert not is_another("if not x := 1:\n    pass", "if x := 1:\n    pass")

@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from benchmarks import __main__ as benchmarks
-from benchmarks.commands import listing
+from benchmarks.commands import listing, tables
 from parapoint import __version__, cli, console
 from reports import __main__ as reports
 
@@ -101,7 +101,7 @@ def test_a_list_fits_a_terminal_and_keeps_every_word(what, width):
     table = listing.LISTS[what]()
     shown = Console(force_terminal=True, color_system=None, width=width)
     with shown.capture() as capture:
-        shown.print(listing.entries(table))
+        shown.print(tables.entries(table))
     lines = capture.get().splitlines()
     assert all(len(line) <= width for line in lines)
     text = "".join("".join(lines).split())

@@ -67,7 +67,7 @@ def test_bare_call_is_the_library_s_part_of_the_method(spec, monkeypatch):
 
 
 def test_a_library_that_is_missing_is_a_row_with_its_reason(monkeypatch, capsys):
-    from benchmarks.commands.display import print_table
+    from benchmarks.commands.tables import print_table
 
     def missing(*_):
         raise MissingError("needs the package nobodys")

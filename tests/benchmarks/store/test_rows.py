@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import errno
+import hashlib
 import json
 import os
 
@@ -180,3 +181,30 @@ def test_a_row_is_appended_inside_writing_alone(tmp_path):
     with pytest.raises(RuntimeError, match="inside appending"):
         add(store, status="failed", seed=1)
     assert len(store.rows()) == 1
+
+
+def test_an_identity_is_what_it_was_so_that_published_rows_are_found_again():
+    cell = {"suite": "a", "case": "b", "method": "c", "params": {"x": 1, "y": 2.5}, "seed": 0}
+    known = identity(**cell, source_hash="d", surface_hash="e")
+    text = '["a","b","c",{"x":1,"y":2.5},0,"d","e"]'
+    assert known == hashlib.sha256(text.encode()).hexdigest()[:32]
+    threaded = hashlib.sha256((text[:-1] + ",4]").encode()).hexdigest()[:32]
+    assert identity(**cell, source_hash="d", surface_hash="e", threads=4) == threaded
+
+
+@pytest.mark.parametrize(
+    ("given", "is_row"),
+    [
+        ({}, True),
+        ({"seed": 2**63 - 1}, True),
+        ({"seed": 2**63}, False),
+        ({"seed": -1}, False),
+        ({"id": "no hash"}, False),
+        ({"surface_hash": ""}, True),
+        ({"surface_hash": "../x"}, False),
+    ],
+)
+def test_only_lines_with_names_and_seeds_that_can_be_are_rows(store, given, is_row):
+    row = dataclasses.replace(add(store), params={}, **given)
+    found = row_of(json.dumps(fields_of(row)).encode())
+    assert found == (row if is_row else None)

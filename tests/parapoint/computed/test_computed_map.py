@@ -133,7 +133,7 @@ class Clock:
     def __init__(self, monkeypatch, pace: float, slow: float | None = None) -> None:
         self.now, self.counts, self.change = 100.0, [], lambda flat: flat
 
-        def timed(points: np.ndarray, _: float, __: str) -> FlatMap:
+        def timed(points: np.ndarray, *_: object) -> FlatMap:
             self.counts.append(len(points))
             is_first = len(self.counts) == 1
             self.now += len(points) * (pace if is_first or slow is None else slow)

@@ -201,3 +201,16 @@ def test_scan_lines_without_a_surface_get_advice(monkeypatch, step: float, error
     monkeypatch.setattr(flattening, "bijective_map", Mock(side_effect=RuntimeError("no way")))
     with pytest.raises(error, match="no way"):
         flat_map(np.column_stack([x, y, 0.1 * np.sin(y)]))
+
+
+def test_the_map_from_the_other_side_is_its_mirror_image_and_its_own_again_from_there() -> None:
+    flat = flat_map(np.random.default_rng(3).uniform(0, 1, (150, 3)) * [2, 1, 0])
+    turned = flat.turned()
+    np.testing.assert_array_equal(turned.uv, flat.uv * [-1, 1])
+    np.testing.assert_array_equal(turned.jacobians[:, 0], -flat.jacobians[:, 0])
+    np.testing.assert_array_equal(turned.jacobians[:, 1], flat.jacobians[:, 1])
+    images = np.einsum("nij,njk->nik", turned.jacobians, turned.inverse_jacobians)
+    np.testing.assert_allclose(images, np.broadcast_to(np.eye(2), images.shape), atol=1e-6)
+    np.testing.assert_array_equal(turned.turned().uv, flat.uv)
+    held = turned.charted
+    assert (signed_areas(held.map.uv, held.map.corners) > 0).all()

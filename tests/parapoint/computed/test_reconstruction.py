@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from parapoint.computed import reconstruction
 from parapoint.computed.reconstruction import (
     _filled,
     _Front,
@@ -118,3 +119,18 @@ def test_a_hole_is_closed_across_its_shorter_diagonal() -> None:
     around = np.array([[0, 4, 1], [1, 5, 2], [2, 6, 3], [3, 7, 0]])
     filled = _filled(np.array(rhombus + outer, dtype=float), around, [np.array([0, 3, 2, 1])])
     assert sorted(map(sorted, filled[4:].tolist())) == [[0, 1, 2], [0, 2, 3]]
+
+
+def test_triangles_in_one_slanted_plane_turn_by_nothing_whatever_rounding_says() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        normal = rng.normal(size=3)
+        across = np.linalg.svd(normal[None])[2][1:]
+        corners = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]) @ across
+        mesh = Mesh(corners, [[0, 1, 2], [0, 2, 3]])
+        np.testing.assert_allclose(reconstruction._bends(mesh), 0, atol=1e-7)
+        # Four boundary edges are four half turns, which are eight quarters; there is no fold.
+        assert reconstruction.roughness(mesh) == pytest.approx(8, abs=1e-6)
+        assert reconstruction.defects(mesh) == 4
+        folded = Mesh(corners, [[0, 1, 2], [0, 3, 2]])
+        assert reconstruction._bends(folded)[0] == pytest.approx(np.pi, abs=1e-6)

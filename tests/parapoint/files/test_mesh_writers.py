@@ -48,6 +48,17 @@ def test_glb_holds_the_texture_bit_for_bit_and_smooth_normals(tmp_path) -> None:
     assert first[2] > 0.9
 
 
+@pytest.mark.parametrize("is_closed", [True, False])
+def test_a_sheet_in_a_glb_file_is_seen_from_both_sides(is_closed, tmp_path) -> None:
+    faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])[: 4 if is_closed else 3]
+    mesh = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], faces)
+    uv = np.tile([[0.0, 0], [1, 0], [0, 1]], (len(faces), 1))
+    corners = np.arange(len(uv)).reshape(-1, 3)
+    write_textured(tmp_path / "a.glb", Charted(mesh, Parameterization(uv, corners)), TEXTURE)
+    loaded = next(iter(trimesh.load(tmp_path / "a.glb").geometry.values()))
+    assert bool(loaded.visual.material.doubleSided) is not is_closed
+
+
 @pytest.mark.parametrize("ending", [".obj", ".ply"])
 def test_side_files_are_sealed_and_named(ending, tmp_path) -> None:
     path = tmp_path / f"my tent{ending}"

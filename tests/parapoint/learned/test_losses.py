@@ -165,3 +165,12 @@ def test_values_and_gradients_of_a_map_scale_with_it(eigenvalues, scale: float) 
     torch.testing.assert_close(
         scaled.grad / scale ** (power - 1), at_one.grad, rtol=1e-3, atol=1e-6
     )
+
+
+@pytest.mark.parametrize(("log", "counted"), [(1.0, 1.0), (3.0, 3.0), (8.0, 3.0), (-8.0, -3.0)])
+def test_areas_count_by_their_logarithms_up_to_three(log: float, counted: float) -> None:
+    # Four conformal images, three of one size and one of e^log times the area: no angles change.
+    side = torch.tensor([1.0, 1.0, 1.0, math.exp(log / 2)])
+    images = torch.stack([torch.stack([side, 0 * side], 1), torch.stack([0 * side, side], 1)])
+    assert float(losses.unfolding_loss(images)) == pytest.approx(0, abs=1e-6)
+    assert float(losses.unfolding_loss(images, 0.5)) == pytest.approx(counted**2 / 8, rel=1e-4)

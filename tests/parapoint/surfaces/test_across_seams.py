@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from parapoint.surfaces import across_seams
 from parapoint.surfaces.across_seams import edges_across_seam, learned_seam, opened
 from parapoint.surfaces.surface import Mesh
 
@@ -80,3 +81,19 @@ def test_a_seam_follows_the_tear_where_another_cut_is_shorter() -> None:
     assert x.min() == 0
     assert x.max() >= 17
     assert (np.abs(y - 4.5) <= 0.5).all()
+
+
+def test_the_pieces_of_an_edge_are_measured_one_by_one() -> None:
+    # A triangle of sides 3, 4 and 5 whose map squares x: pieces of an edge along x grow.
+    mesh = Mesh([[0, 0, 0], [3, 0, 0], [0, 4, 0]], [[0, 1, 2]])
+
+    def squared(points):
+        return points[:, :2] * np.column_stack([points[:, 0], np.ones(len(points))])
+
+    edges = [tuple(edge) for edge in mesh.edges.tolist()]
+    count = np.array([{(0, 1): 3, (0, 2): 2, (1, 2): 1}[edge] for edge in edges])
+    found = across_seams._piece_lengths(mesh, squared(mesh.vertices), squared, count)
+    wanted = {(0, 1): [1, 3, 5], (0, 2): [2, 2], (1, 2): [np.hypot(9, 4)]}
+    np.testing.assert_allclose(found, np.concatenate([wanted[edge] for edge in edges]))
+    whole = across_seams._piece_lengths(mesh, squared(mesh.vertices), None, np.ones(3, int))
+    np.testing.assert_allclose(np.sort(whole), [4, 9, np.hypot(9, 4)])

@@ -40,3 +40,15 @@ def test_points_that_stand_twice_cover_the_plane_as_single_ones_do() -> None:
     known = np.repeat(RNG.random((20_000, 2)), 2, axis=0)
     mesh, _ = gridded(known, lambda uv: np.column_stack([uv, 0 * uv[:, 0]]))
     assert_allclose(mesh.face_areas.sum(), 1, rtol=0.1)
+
+
+@pytest.mark.parametrize(("gap", "is_open"), [(7, False), (12, True)])
+def test_a_gap_is_bridged_up_to_four_and_a_half_spacings_from_either_side(gap, is_open) -> None:
+    """A square lattice of 40 by 40 points, one apart, with a gap of some columns in the middle."""
+    x, y = (of.ravel() for of in np.meshgrid(np.arange(40.0), np.arange(40.0)))
+    known = np.column_stack([x + (gap - 1) * (x >= 20), y])
+    mesh, own = gridded(known, lambda uv: np.column_stack([uv, 0 * uv[:, 0]]))
+    assert mesh.component_count == (2 if is_open else 1)
+    inside = (own.uv[:, 0] > 19) & (own.uv[:, 0] < 19 + gap)
+    reached = np.minimum(own.uv[inside, 0] - 19, 19 + gap - own.uv[inside, 0]).max()
+    assert reached == pytest.approx(min(4.5, gap / 2), abs=0.3)

@@ -171,3 +171,9 @@ def test_vertex_normals_are_means_by_area():
     normals = vertex_normals(mesh)
     both = np.array([0, 1, 3]) / np.sqrt(10)
     assert normals == pytest.approx(np.array([both, both, [0, 0, 1], [0, 1, 0]]))
+
+
+def test_halfedges_run_around_each_face_from_its_first_corner():
+    mesh = Mesh(np.random.default_rng(0).normal(size=(4, 3)), [[0, 1, 2], [3, 2, 1]])
+    wanted = [[0, 1], [1, 2], [2, 0], [3, 2], [2, 1], [1, 3]]
+    np.testing.assert_array_equal(mesh.halfedges, wanted)

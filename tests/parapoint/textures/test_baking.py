@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from parapoint import InputError, Mesh, Parameterization, PointCloud
 from parapoint.surfaces.parameterization import Charted
-from parapoint.textures.baking import baked, check_size, check_together
+from parapoint.textures.baking import APART, baked, check_size, check_together
 from parapoint.textures.tangents import corner_tangents
 
 RNG = np.random.default_rng(0)
@@ -141,3 +141,18 @@ def test_a_cloud_elsewhere_is_refused() -> None:
 def test_sizes_out_of_range_are_refused(size, margin) -> None:
     with pytest.raises(InputError, match="must be from"):
         check_size(size, margin)
+
+
+@pytest.mark.parametrize("away", [0.9, 1.1])
+def test_a_cloud_may_lie_so_far_from_a_model_as_its_diagonal_says(away) -> None:
+    # A strip of 3 by 4: its diagonal is 5. Two thirds of the points lie beside it.
+    mesh = Mesh([[0, 0, 0], [3, 0, 0], [3, 4, 0], [0, 4, 0]], [[0, 1, 2], [0, 2, 3]])
+    uv = np.array([[0.0, 0], [0.75, 0], [0.75, 1], [0, 1]])
+    points = np.array([[1, 1, 0], [1, 2, 0], [2, 1, 0], [2, 2, 0], [1, 3, 0], [2, 3, 0]])
+    points = points + np.outer([0, 0, 1, 1, 1, 1], [0, 0, away * APART * 5])
+    charted, cloud = Charted(mesh, Parameterization(uv, mesh.faces)), PointCloud(points)
+    if away < 1:
+        check_together(charted, cloud)
+    else:
+        with pytest.raises(InputError, match=r"does not lie on .* which is 5 across"):
+            check_together(charted, cloud)

@@ -82,3 +82,11 @@ def test_a_chart_without_area_is_moved_as_it_is() -> None:
     made = packed(Charted(given.mesh, Parameterization(uv, given.map.corners)))
     assert np.isfinite(made.map.uv).all()
     assert np.ptp(made.map.uv[8:], axis=0).max() < 1e-9
+
+
+@pytest.mark.parametrize("unit", [2.0**-20, 2.0**20])
+def test_the_unit_and_the_place_of_a_map_make_no_difference(unit) -> None:
+    given = flags(6)
+    known = packed(given).map.uv
+    moved = Parameterization(unit * (given.map.uv + 8), given.map.corners)
+    np.testing.assert_allclose(packed(Charted(given.mesh, moved)).map.uv, known, atol=1e-4)
