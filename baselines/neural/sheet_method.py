@@ -3,40 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import torch
-from torch import Tensor, nn
 
-from baselines.neural.sheets import (
-    Sheet,
-    corner_rows,
-    face_charts,
-    fitted,
-    nearest_sheets,
-    packed,
-    preimages,
-)
-from baselines.neural.training import NeuralMethod
+from baselines.neural.method import NeuralMethod
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization
 from parapoint.surfaces.sampling import training_points
 from parapoint.surfaces.surface import FloatArray, Mesh, Surface
 
+if TYPE_CHECKING:
+    import torch
+    from torch import Tensor
 
-class Sheets(nn.Module):
-    """Networks of one or more sheets.
-
-    Attributes:
-        sheets: see `baselines.neural.sheets.Sheet`.
-    """
-
-    def __init__(self, sheets: list[nn.Module]) -> None:
-        super().__init__()
-        self.sheets = nn.ModuleList(sheets)
-
-    def terms(self, given: Tensor, count: int, generator: torch.Generator) -> dict[str, Tensor]:
-        """The loss on points (N, 3) of the surface and `count` random places of the sheets."""
-        raise NotImplementedError
+    from baselines.neural.sheets import Sheet, Sheets
 
 
 @dataclass(frozen=True)
@@ -69,6 +49,17 @@ class SheetMethod(NeuralMethod):
         Raises:
             InputError: fewer than 100 distinct points, or all on a line.
         """
+        import torch
+
+        from baselines.neural.sheets import (
+            corner_rows,
+            face_charts,
+            fitted,
+            nearest_sheets,
+            packed,
+            preimages,
+        )
+
         cloud = training_points(surface, self.points, seed)
         centre = (cloud.min(axis=0) + cloud.max(axis=0)) / 2
         scale = float(np.linalg.norm(cloud - centre, axis=1).max())
@@ -106,8 +97,3 @@ class SheetMethod(NeuralMethod):
         share = np.bincount(of_face, surface.face_areas, len(sheets)) / surface.face_areas.sum()
         placed: FloatArray = scale * packed(rows, of_row, share)
         return Parameterization(placed, corners, trace, report)
-
-
-def random_places(count: int, generator: torch.Generator) -> Tensor:
-    """(count, 2) random places of the square from -1 to 1."""
-    return 2 * torch.rand(count, 2, generator=generator) - 1

@@ -34,6 +34,22 @@ BATCH = 4_096
 """Points whose preimages are refined at a time."""
 
 
+class Sheets(nn.Module):
+    """Networks of one or more sheets.
+
+    Attributes:
+        sheets: see `Sheet`.
+    """
+
+    def __init__(self, sheets: list[nn.Module]) -> None:
+        super().__init__()
+        self.sheets = nn.ModuleList(sheets)
+
+    def terms(self, given: Tensor, count: int, generator: torch.Generator) -> dict[str, Tensor]:
+        """The loss on points (N, 3) of the surface and `count` random places of the sheets."""
+        raise NotImplementedError
+
+
 def fitted(
     networks: nn.Module,
     terms: Callable[[], dict[str, Tensor]],
@@ -130,3 +146,8 @@ def corner_rows(of_face: IntArray, faces: IntArray) -> tuple[IntArray, IntArray,
     pairs = np.stack([faces.reshape(-1), np.repeat(of_face, 3)], axis=1)
     rows, corners = np.unique(pairs, axis=0, return_inverse=True)
     return corners.reshape(-1, 3), rows[:, 0], rows[:, 1]
+
+
+def random_places(count: int, generator: torch.Generator) -> Tensor:
+    """(count, 2) random places of the square from -1 to 1."""
+    return 2 * torch.rand(count, 2, generator=generator) - 1

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 import torch
 
-from baselines.neural.atlasnet import AtlasNet, AtlasNetworks, chamfer
-from baselines.neural.foldingnet import FoldingNet, FoldingNetworks, TwoFolds
+from baselines.neural.atlasnet import AtlasNet
+from baselines.neural.atlasnet_networks import AtlasNetworks, chamfer
+from baselines.neural.foldingnet import FoldingNet
+from baselines.neural.foldingnet_networks import FoldingNetworks, TwoFolds
 from baselines.neural.sheets import (
     corner_rows,
     face_charts,
