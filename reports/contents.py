@@ -32,6 +32,7 @@ WORST_PART = "part_area_ratio_min_without_spanning"
 SHEETS = 12
 """Most models of a report in which each has figures of its own, and all pictures for them."""
 ISOMETRIC = "symmetric_dirichlet"
+SEAM = "seam_length"
 OVERLAPPED, BIJECTIVE = "overlapped_fraction", "bijective"
 POINT_ANGLE, POINT_AREA = "local_quasi_conformal_mean", "local_area_log_ratio_mean"
 POINT_COLLISIONS, POINT_TEARS = "uv_collision_fraction", "spanning_point_fraction"
@@ -405,7 +406,7 @@ def contents(folder: Path) -> list[Contents]:
             **{name: part["id"].map(of).astype("float64") for name, of in times.items()},
         )
         # A learned seam that faces span has no edges: 0 would read, and rank, as no seam at all.
-        part.loc[part[SPANNING] > 0, ["seam_length", "seam_excess"]] = math.nan
+        part.loc[part[SPANNING] > 0, [SEAM, "seam_excess"]] = math.nan
         cells: list[dict[str, Any]] = [
             {str(name): value for name, value in record.items()}
             for record in part.to_dict("records")

@@ -15,8 +15,9 @@ find that nothing is left to do.
 `overhead` runs cells of every method, and prints what each costs beside the time of its method.
 
 `all` repeats these until a time is over: kills, faults, commands among a user's files
-(`benchmarks.checks.bystanders`); and kills of every kind of process, full and read-only disks, and
-rows with values that no run of ours writes (`benchmarks.checks.hardships`).
+(`benchmarks.checks.bystanders`); and kills of every kind of process, commands broken off by
+signals, full and read-only disks, and rows with values that no run of ours writes
+(`benchmarks.checks.hardships`).
 """
 
 from __future__ import annotations
@@ -254,9 +255,10 @@ def all_(ctx: click.Context, minutes: float, seed: int) -> None:
             wrong = saved(folder / "faulty", folder / "wrong", 1)
             found = undisturbed(folder / "bystanders", count=10, seed=seed + rounds)
             ended = hardships.kills(folder / "kills", seed=seed + rounds)
+            broken = hardships.broken_off(folder / "broken", seed=seed + rounds, count=5)
             disks = hardships.disks(folder / "disks", seed=seed + rounds, count=8)
             rows = hardships.rows(folder / "rows", seed=seed + rounds, count=2)
-        said = [*found.faults, *ended.faults, *disks.faults, *rows.faults]
+        said = [*found.faults, *ended.faults, *broken.faults, *disks.faults, *rows.faults]
         for fault in said:
             print(fault)
         rounds += 1
@@ -266,6 +268,7 @@ def all_(ctx: click.Context, minutes: float, seed: int) -> None:
             f"{wrong.reported} cells of which {2 * len(faulty.FAULTS)} went wrong, "
             f"{found.runs} commands ({found.refused} refused) among {found.files} files, "
             f"{ended.tried} kills of {', '.join(hardships.VICTIMS)} and what they had started, "
+            f"{broken.tried} commands broken off by signals, "
             f"{disks.tried} commands on full or read-only disks, "
             f"{rows.tried} commands on evil rows; faults so far: {total}",
             flush=True,

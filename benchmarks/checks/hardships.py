@@ -29,6 +29,22 @@ from benchmarks.checks import bystanders, faulty
 
 VICTIMS = ("run", "supervisor", "cell", "report")
 """What is killed, together with all that it has started."""
+WRITING = {
+    "parapoint fit {cloud} --out {folder}/made --points 120": "",
+    "parapoint unwrap {mesh} --out {folder}/made.obj --texture 64": "made.obj",
+    "parapoint bake {model} {cloud} --out {folder}/map.png --map position --texture 64": "map.png",
+    "parapoint map {model} {cloud} --out {folder}/made.ply": "made.ply",
+    "benchmarks publish {public} --out {folder}/made.zip": "made.zip",
+}
+"""Commands that write one output, and the file of it that has the same bytes each time."""
+MANNERS = {
+    "killed": (signal.SIGKILL,),
+    "terminated": (signal.SIGTERM,),
+    "hung up on": (signal.SIGHUP,),
+    "interrupted": (signal.SIGINT,),
+    "stopped and killed": (signal.SIGSTOP, signal.SIGKILL),
+}
+"""How a command is broken off, by the signals that it gets."""
 DISKS = ("full", "read-only")
 """What is wrong with a disk."""
 GONE_AFTER = 5.0
@@ -121,14 +137,85 @@ def _killed(victim: str, command: list[str], folder: Path, draw: random.Random) 
         process.kill()
         process.wait()
         found.faults.append(f"kill of a {victim}: the command never ended")
+    left = _left(tag, folder)
+    found.faults += [f"kill of a {victim}: process {pid} is left" for pid in left]
+    return found
+
+
+def broken_off(folder: Path, *, seed: int, count: int) -> Hardship:
+    """Break off commands that write one output, in every manner and at any instant.
+
+    The output is there whole or not at all, no other file changes, no process goes on, and the
+    same command ends well afterwards.
+    """
+    draw = random.Random(seed)  # noqa: S311  no secret
+    found = Hardship()
+    given = bystanders.inputs(folder / "inputs") | {"results": folder / "inputs" / "results"}
+    given["public"] = folder / "inputs" / "public"  # rows of a user's own files are left out
+    run = "benchmarks run builtin --cases half_cylinder --methods tutte --out {public}"
+    _run(bystanders.arguments(run.format(**given)), folder)
+    whole: dict[str, tuple[float, dict[str, str]]] = {}
+    for number in range(count):
+        command, output = list(WRITING.items())[number % len(WRITING)]
+        manner = draw.choice(list(MANNERS))
+        place = folder / f"place{number}"
+        (place / "mine").mkdir(parents=True)
+        (place / "mine" / "model.json").write_text("mine")
+        asked = bystanders.arguments(command.format(**given, folder=place / "mine"))
+        before = dict(bystanders.hashes(folder / "inputs"))
+        if command not in whole:
+            began = time.monotonic()
+            _run(asked, folder)
+            made = {path.name: value for path, value in bystanders.hashes(place / "mine")}
+            whole[command] = time.monotonic() - began, made
+            shutil.rmtree(place / "mine")
+            (place / "mine").mkdir()
+            (place / "mine" / "model.json").write_text("mine")
+        seconds, expected = whole[command]
+        left = _broken_off(asked, place, MANNERS[manner], draw.uniform(0, seconds))
+        found.tried += 1
+        what = f"{command.split(' --')[0]} {manner}"
+        found.faults += [f"{what}: process {pid} is left" for pid in left]
+        now = {path.name: value for path, value in bystanders.hashes(place / "mine")}
+        if output in now and now[output] != expected[output]:
+            found.faults.append(f"{what}: {output} is there by halves")
+        if (place / "mine" / "model.json").read_text() != "mine":
+            found.faults.append(f"{what}: a file of the user's has changed")
+        if dict(bystanders.hashes(folder / "inputs")) != before:
+            found.faults.append(f"{what}: an input has changed")
+        if (again := _run(asked, folder)).returncode:
+            found.faults.append(f"{what}, and again: {_said(again)}")
+    return found
+
+
+def _broken_off(
+    asked: list[str], place: Path, signals: tuple[signal.Signals, ...], delay: float
+) -> list[int]:
+    """Start Python with these arguments, break it off, and name the processes that are left."""
+    tag = secrets.token_hex(8)
+    process = subprocess.Popen(  # noqa: S603  our own commands
+        [sys.executable, *asked],
+        cwd=place,
+        env=_environment() | {TAG: tag},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    time.sleep(delay)
+    for one in signals:
+        process.send_signal(one)
+    process.wait(60)
+    return _left(tag, place)
+
+
+def _left(tag: str, folder: Path) -> list[int]:
+    """The processes that still run GONE_AFTER seconds later. They are killed then."""
     deadline = time.monotonic() + GONE_AFTER
     while (left := _started(tag, folder)) and time.monotonic() < deadline:
         time.sleep(0.1)
-    found.faults += [f"kill of a {victim}: process {pid} is left" for pid in left]
     for pid in left:
         with contextlib.suppress(ProcessLookupError):
             os.kill(pid, signal.SIGKILL)
-    return found
+    return left
 
 
 def _started(tag: str, folder: Path) -> list[int]:

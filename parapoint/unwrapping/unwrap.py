@@ -56,7 +56,8 @@ class Unwrap:
     `ComputedMap`, made a clean path of edges (`parapoint.surfaces.across_seams`), or along the
     automatic cut (`parapoint.surfaces.cutting`) where no map can be computed. Where the map must
     come below a bound on the energy, a disk is begun in both ways, and the shorter seam stays.
-    Where to a large mesh's seam grows is told by a simplified one (`parapoint.planar.coarse`).
+    Where to a large mesh's seam grows is told by a simplified one (`parapoint.planar.coarse`), but
+    under a bound, as the two differ in energy.
     Components are mapped one after another.
 
     Attributes:
@@ -153,8 +154,10 @@ class Unwrap:
             seam, computed = self._seam(mesh, seed, deadline)
             other = self._grown(mesh, seam, deadline)
             run = other if run is None else min(run, other, key=self._cost)
+            seam &= run is other
         run.deadline = deadline
-        run.improve()
+        if self._grows:
+            run.improve()
         self._keep_angles(run)
         report = {
             **run.report(),
@@ -196,7 +199,7 @@ class Unwrap:
         run.improve()
         if not self._grows:
             return run
-        if len(mesh.faces) > LARGE:
+        if len(mesh.faces) > LARGE and self.max_distortion is None:
             run = grown_as_coarse(run, self._need)
             if not self._need.of(run):
                 return run

@@ -49,6 +49,7 @@ from reports.pictures.plots import (
     cost,
     losses,
     pareto,
+    seams,
     singular_values,
 )
 from reports.pictures.style import DARK_PAPER, STYLE, darken
@@ -225,6 +226,16 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
             "collapsed, so not on the steps. A map may buy the one with the other.",
             make=partial(pareto, contents),
             cases=cases,
+            size=PANELS,
+        ),
+        *several(
+            "seams",
+            "Energy against seams",
+            "Symmetric Dirichlet energy (4 for an isometry; 20 stands for all above) against the "
+            "length of the seam over the root of the area. Hollow: many charts; pale: broken or "
+            "collapsed. A longer seam buys less distortion.",
+            make=partial(seams, contents),
+            cases=meshes,
             size=PANELS,
         ),
         *several(

@@ -20,7 +20,7 @@ from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray
-from reports.contents import ANGLE, AREA, Contents, Label
+from reports.contents import ANGLE, AREA, ISOMETRIC, SEAM, Contents, Label
 from reports.pictures.galleries import leading
 from reports.pictures.style import (
     COLOURS,
@@ -38,6 +38,8 @@ LEAST_ANGLE, LEAST_AREA = 1e-4, 1e-3
 
 Tables print smaller ones as "<0.0001" and "<0.001".
 """
+MOST_ENERGY = 20.0
+"""Symmetric Dirichlet energy, 4 at least, above which figures draw all values alike."""
 LEAST_SIZES = 5
 """Least number of different sizes through which a power law is drawn."""
 LEAST, MOST = 1e-30, 1e30
@@ -180,18 +182,7 @@ def pareto(contents: Contents, cases: Sequence[str]) -> Figure | None:
     made, places = small_multiples(len(shown))
     for place, (case, points) in zip(places, shown.items(), strict=True):
         place.set_yscale("log")
-        for label in contents.methods:
-            if label.short in points.index:
-                style = look(contents, label) | {"linestyle": "none"}
-                style["markersize"] = 10 if style["marker"] == "*" else 6.5
-                if label.short in contents.atlases:
-                    style |= {"markerfacecolor": "none", "markeredgecolor": style["color"]}
-                else:
-                    style |= {"markeredgecolor": "white", "markeredgewidth": 0.5}
-                if not points.loc[label.short, "fit"]:
-                    style["alpha"] = 0.35
-                at = points.loc[label.short, [AREA, ANGLE]]
-                place.plot(at.iloc[0], at.iloc[1], label=label.short, clip_on=False, **style)
+        _mark(place, contents, points, AREA, ANGLE)
         front = pareto_front(contents, points)
         place.step(front[:, 0], front[:, 1], where="post", color="0.6", linewidth=0.8, zorder=1)
         place.set_title(case)
@@ -203,6 +194,54 @@ def pareto(contents: Contents, cases: Sequence[str]) -> Figure | None:
         place.set_xlim(-0.04 * right, right)  # no marker is cut at the left end
     legend_below(made, places)
     return made
+
+
+def _mark(place: Axes, contents: Contents, points: pd.DataFrame, x: str, y: str) -> None:
+    """A marker for each method: hollow for many charts, pale where it is not `fit`."""
+    for label in contents.methods:
+        if label.short in points.index:
+            style = look(contents, label) | {"linestyle": "none"}
+            style["markersize"] = 10 if style["marker"] == "*" else 6.5
+            if label.short in contents.atlases:
+                style |= {"markerfacecolor": "none", "markeredgecolor": style["color"]}
+            else:
+                style |= {"markeredgecolor": "white", "markeredgewidth": 0.5}
+            if not points.loc[label.short, "fit"]:
+                style["alpha"] = 0.35
+            at = points.loc[label.short, [x, y]]
+            place.plot(at.iloc[0], at.iloc[1], label=label.short, clip_on=False, **style)
+
+
+def seams(contents: Contents, cases: Sequence[str]) -> Figure | None:
+    """Symmetric Dirichlet energy against the length of the seam, model by model."""
+    shown = {case: points for case in cases if len(points := prices(contents, case))}
+    if not shown:
+        return None
+    made, places = small_multiples(len(shown))
+    for place, (case, points) in zip(places, shown.items(), strict=True):
+        place.set_yscale("log")
+        _mark(place, contents, points, SEAM, ISOMETRIC)
+        place.set_title(case)
+        place.set_xlabel("seam / √area")
+    places[0].set_ylabel("symmetric Dirichlet energy")
+    share_limits(places)
+    for place in places:
+        right = place.get_xlim()[1]
+        place.set_xlim(-0.04 * right, right)
+    legend_below(made, places)
+    return made
+
+
+def prices(contents: Contents, case: str) -> pd.DataFrame:
+    """Seam and energy of the maps of a model, and whether each is `fit` to be ranked.
+
+    By the methods' short names; energies above MOST_ENERGY are lowered to it.
+    """
+    own = contents.means[(contents.means["case"] == case) & (contents.means["ok"] > 0)]
+    own = own[np.isfinite(own[SEAM]) & np.isfinite(own[ISOMETRIC])].set_index("label")
+    points: pd.DataFrame = own[[SEAM, ISOMETRIC]].clip(upper=[np.inf, MOST_ENERGY], axis=1)
+    points["fit"] = [may_rank(found, angles=False) for found in own["grade"]]
+    return points
 
 
 def trade_offs(contents: Contents, case: str) -> pd.DataFrame:

@@ -47,6 +47,7 @@ def test_ours_reads_back_better_than_the_nearest_colour() -> None:
     assert made.report["held_out"] == pytest.approx(600, abs=60)
     seen = cloud.points[seen_points(3000, 0)]
     assert made.report["bake_psnr"] > 30
+    assert made.report["charts"] == 1
     rows = np.flatnonzero(~np.isin(cloud.points[:, 0], seen[:, 0]))
     nearest = nearest_baked(PLATE, PointCloud(seen, attributes={"colours": colours_at(seen)}), 128)
     wrong = looked_up(PLATE, nearest, cloud.points[rows]) - wave_colours(cloud.points[rows], 5.0)

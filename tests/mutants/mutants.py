@@ -58,8 +58,10 @@ FAMILIES = {
 TALK = frozenset({"print", "echo", "secho", "debug", "info", "warning", "fail", "InputError"})
 """Functions whose arguments are words for a reader."""
 
-LOOKS = frozenset({"strict", "digits", "figsize", "fontsize", "linewidth", "markersize", "zorder"})
-"""Keywords whose values are not changed: how a table or a figure looks, and `strict=` of zip."""
+LOOKS = frozenset(
+    {"digits", "figsize", "fontsize", "linewidth", "markersize", "zorder", "copy", "strict"}
+)
+"""Keywords whose values are not changed: the looks of tables and figures, `copy=`, `strict=`."""
 DRAWS = frozenset({"default_rng", "manual_seed", "Random"})
 """Functions whose arguments are seeds: another is as good."""
 ABOUT = 10

@@ -81,3 +81,35 @@ def test_text_from_elsewhere_is_shown_as_text_alone() -> None:
     cut = [console.printable(text, longest=6) for text in ("abcdefg", "abcdefh")]
     assert all(text.startswith("abcdef… (") and len(text) == 16 for text in cut)
     assert cut[0] != cut[1]
+
+
+@pytest.mark.parametrize(
+    ("outcome", "status", "said"),
+    [
+        (None, 0, ""),
+        (3, 3, ""),
+        ("done", 0, ""),
+        (KeyboardInterrupt(), 130, "interrupted"),
+        (click.Abort(), 130, "interrupted"),
+        (InputError("no  such\nthing"), 2, "error: no such thing"),
+        (ModuleNotFoundError("x", name="shapely"), 2, "error: shapely is not installed"),
+        (FileNotFoundError(2, "No such file", "a.obj"), 2, "error: a.obj: no such file"),
+        (OSError("gone"), 2, "error: gone"),
+        (OSError(28, "No space left"), 2, "error: no space left"),
+        (click.UsageError("Too many."), 2, "error: Too many"),
+        (click.ClickException("Bad thing"), 2, "error: Bad thing"),
+    ],
+)
+def test_a_command_ends_with_its_status_and_one_line(capsys, outcome, status, said):
+    @click.command()
+    def ending():
+        if isinstance(outcome, BaseException):
+            raise outcome
+        return outcome
+
+    with pytest.raises(SystemExit) as ended:
+        console.run(ending, [])
+    assert ended.value.code == status
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == bool(said)
+    assert "".join(lines).startswith(said)

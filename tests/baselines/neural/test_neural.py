@@ -240,3 +240,14 @@ def test_the_terms_of_nuvo_by_a_second_route(monkeypatch):
         "stretch": (area - 1).square().mean(),
     }
     assert terms == pytest.approx({name: of.item() for name, of in wanted.items()}, rel=1e-3)
+
+
+def test_the_weights_are_those_of_the_authors_and_of_the_reimplementation():
+    assert FAMTrainer.weights == {"wrap": 1, "unwrap": 0.01, "cycle": 0.01, "distortion": 0.01}
+    assert NuvoTrainer.weights == {
+        "three_two_three": 1,
+        "two_three_two": 1,
+        "surface": 10,
+        "conformal": 0.4,
+        "stretch": 0.1,
+    }

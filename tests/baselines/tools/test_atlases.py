@@ -242,6 +242,9 @@ def test_method_of_a_missing_package_is_unsupported(monkeypatch):
     ("program", "fault"),
     [
         ("import sys; sys.exit('no licence')", "ended with status 1: no licence"),
+        ("import sys; sys.exit('first\\nlast')", "ended with status 1: last$"),
+        ("import sys; print('so\\nit is'); sys.exit(3)", "ended with status 3: it is$"),
+        ("import sys; sys.exit(4)", "ended with status 4: $"),
         ("pass", "wrote no UV map: .*no such file"),
         ("import shutil, sys; shutil.copy(*sys.argv[1:3])", "wrote no UV map: .*no UV"),
         (

@@ -172,3 +172,30 @@ def test_a_sampled_cloud_is_even_or_falls_tenfold():
     # A third of the way is a factor of the cube root of ten, in one direction or the other.
     assert_allclose(np.abs(np.log10(ratio)), 1 / 3, atol=0.06)
     assert np.sign(np.log10(ratio)).tolist() in ([1, 1], [-1, -1])
+
+
+SHAPES = {
+    "half_cylinder": (625, 1152, (0.0, 0.6103, 1.5, 0.7211, 0.328, 0.9014, 2.6915)),
+    "cone": (769, 1488, (0.0, 0.0, 0.9389, 0.4271, 0.4271, 0.5771, 1.086)),
+    "sphere_cap_45": (817, 1536, (0.0, 0.0, 0.8422, 0.376, 0.376, 0.0893, 1.1699)),
+    "sphere_cap_90": (817, 1536, (0.0, 0.0, 0.4346, 0.5999, 0.5999, 0.3021, 0.7624)),
+    "sphere_cap_150": (817, 1536, (0.0, 0.0, -0.2044, 0.5728, 0.5728, 0.5497, 1.0003)),
+    "saddle": (625, 1152, (0.0, 0.0, 0.0, 0.6009, 0.6009, 0.4557, 0.8024)),
+    "wavy_sheet": (625, 1152, (0.4624, 0.5112, 0.0013, 0.3093, 0.2982, 0.0469, 0.7496)),
+    "swiss_roll": (949, 1728, (-0.2742, 2.2981, 2.0, 8.0875, 7.5991, 1.2472, 9.1139)),
+    "sphere": (642, 1280, (0.0, 0.0, 0.0, 0.5774, 0.5774, 0.5774, 0.9222)),
+    "torus": (1152, 2304, (0.0, 0.0, 0.0, 0.7348, 0.7348, 0.2828, 0.7218)),
+}
+"""Vertices, faces, and their means, deviations and a sum in which their order counts: rows that are
+published were measured on these."""
+
+
+@pytest.mark.parametrize("name", sorted(SHAPES))
+def test_shapes_and_the_order_of_their_vertices_stay(name):
+    mesh = BUILTIN[name]()
+    vertices, faces, wanted = SHAPES[name]
+    assert (len(mesh.vertices), len(mesh.faces)) == (vertices, faces)
+    at = mesh.vertices
+    ordered = np.abs(at @ [1, 2, 3]) @ np.arange(vertices) / vertices**2
+    found = np.concatenate([at.mean(axis=0), at.std(axis=0), [ordered]])
+    np.testing.assert_allclose(found, wanted, atol=2e-4)

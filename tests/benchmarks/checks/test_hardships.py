@@ -66,3 +66,30 @@ def test_rows_of_others_that_end_a_report_are_told(tmp_path, monkeypatch) -> Non
     )
     found = hardships.rows(tmp_path / "wrong", seed=0, count=1)
     assert [fault.split()[0] for fault in found.faults] == ["benchmarks", "reports", "a"]
+
+
+@pytest.mark.parametrize("fault", [None, "there by halves", "user's has changed", "is left"])
+def test_what_is_left_of_commands_that_are_broken_off_is_told(fault, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(hardships, "WRITING", {"benchmarks make {folder}/made.zip": "made.zip"})
+    ended(monkeypatch, lambda at: at.suffix and at.write_text("whole"), 0, "")
+
+    def breaks(_: list[str], place: Path, *__: object) -> list[int]:
+        if fault == "user's has changed":
+            (place / "mine" / "model.json").write_text("ours")
+        (place / "mine" / "made.zip").write_text("who" if fault == "there by halves" else "whole")
+        return [7] if fault == "is left" else []
+
+    monkeypatch.setattr(hardships, "_broken_off", breaks)
+    found = hardships.broken_off(tmp_path, seed=0, count=1)
+    assert found.tried == 1
+    assert len(found.faults) == (fault is not None)
+    assert fault is None or fault in found.faults[0]
+
+
+def test_processes_that_a_broken_command_leaves_are_told(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(hardships, "GONE_AFTER", 0.2)
+    waits = "import subprocess, time; {}; time.sleep(60)"
+    for then, count in (("subprocess.Popen(['sleep', '60'])", 1), ("", 0)):
+        code = waits.format(then or "pass")
+        signals = hardships.MANNERS["stopped and killed"]
+        assert len(hardships._broken_off(["-c", code], tmp_path, signals, 1.0)) == count

@@ -204,6 +204,8 @@ def test_a_ply_file_keeps_all_but_the_uvs(text, tmp_path) -> None:
     index = after["face"].columns["vertex_indices"].values
     original = -after["vertex"].columns["q"].values[index]
     assert np.array_equal(original, before["face"].columns["vertex_indices"].values)
+    sizes = after["face"].columns["vertex_indices"].sizes
+    assert np.array_equal(after["face"].columns["texcoord"].sizes, 2 * sizes)
     wedges = after["face"].columns["texcoord"].values.reshape(-1, 2)
     assert_allclose(wedges[:, 0], after["vertex"].columns["s"].values[index], atol=1e-6)
     own = read_parameterized(out)[1]

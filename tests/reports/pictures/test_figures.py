@@ -11,7 +11,7 @@ from PIL import Image as Images
 from pypdf import PdfReader
 
 from reports import contents as contents_module
-from reports.contents import ANGLE, AREA, contents
+from reports.contents import ANGLE, AREA, ISOMETRIC, SEAM, contents
 from reports.pictures import figures, galleries, plots
 from reports.pictures.figures import draw, drawings, write
 from reports.pictures.galleries import leading
@@ -253,6 +253,20 @@ def test_a_map_that_may_not_be_ranked_is_not_fit(tmp_path):
     found = plots.trade_offs(made, HAND)
     assert found["fit"].to_dict() == {"LSCM": False, "ARAP": False, "SLIM": True}
     assert found.loc["ARAP", ANGLE] == plots.LEAST_ANGLE
+
+
+def test_energies_stand_against_seams(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for method in ("lscm", "arap"):
+            writer.cell(HAND, sheet(), method, {}, result=flat(sheet(), 0.3))
+    made = contents(tmp_path)[0]
+    made.means.loc[made.means["label"] == "LSCM", [SEAM, ISOMETRIC]] = 1.5, 1e9
+    (place,) = plots.seams(made, made.cases).axes
+    drawn = {line.get_label(): tuple(line.get_xydata()[0]) for line in place.lines}
+    assert drawn["LSCM"] == (1.5, plots.MOST_ENERGY)
+    assert drawn["ARAP"][0] == 0
+    assert 4 <= drawn["ARAP"][1] < plots.MOST_ENERGY
 
 
 @pytest.mark.parametrize(("sizes", "lines"), [(4, 0), (5, 1)])
