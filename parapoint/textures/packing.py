@@ -6,6 +6,7 @@ import numpy as np
 import xatlas
 
 from parapoint.surfaces.parameterization import Charted, Parameterization
+from parapoint.surfaces.preparation import shelves
 from parapoint.surfaces.surface import FloatArray, IntArray
 from parapoint.textures.placing import BORDER, Placing
 
@@ -40,14 +41,13 @@ def packed(charted: Charted, border: float = BORDER) -> Charted:
 def _packed(held: Parameterization, border: float, resolution: int) -> FloatArray:
     """(T, 2) the map with its charts beside one another, in its own scale."""
     faces, label = held.corners, held.charts()
-    low = held.uv[faces.reshape(-1)].min(axis=0)
-    extent = float(np.ptp(held.uv[faces.reshape(-1)], axis=0).max()) or 1.0
     chart_of = np.zeros(len(held.uv), dtype=np.int64)
     chart_of[faces] = label[:, None]
+    apart, side = _apart(held.uv, chart_of, np.unique(faces))
     padding = 0
     for _ in range(PASSES):
         atlas = xatlas.Atlas()
-        atlas.add_uv_mesh(((held.uv - low) / extent).astype(np.float32), faces.astype(np.uint32))
+        atlas.add_uv_mesh((apart / side).astype(np.float32), faces.astype(np.uint32))
         options = xatlas.PackOptions()
         options.resolution = resolution
         options.padding = padding
@@ -58,6 +58,26 @@ def _packed(held: Parameterization, border: float, resolution: int) -> FloatArra
     grid = np.zeros_like(held.uv)
     grid[faces] = (found * [atlas.width, atlas.height])[indices.reshape(faces.shape)]
     return _moved(held.uv, grid, chart_of, faces)
+
+
+def _apart(uv: FloatArray, chart_of: IntArray, rows: IntArray) -> tuple[FloatArray, float]:
+    """(T, 2) the charts in shelves, and the side of a square as large as their boxes together.
+
+    xatlas takes charts that touch for one, and its grid's cells in the unit of the map that it is
+    given: a map whose charts lie far apart would get a grid too coarse for them.
+
+    Args:
+        uv: (T, 2) a map.
+        chart_of: (T,) the chart of each of its points.
+        rows: points that are in a face.
+    """
+    low = np.full((int(chart_of.max()) + 1, 2), np.inf)
+    high = -low
+    np.minimum.at(low, chart_of[rows], uv[rows])
+    np.maximum.at(high, chart_of[rows], uv[rows])
+    sizes = high - low
+    side = float(np.sqrt(sizes.prod(axis=1).sum())) or 1.0
+    return uv + (shelves(sizes) - low)[chart_of], side
 
 
 def _moved(uv: FloatArray, grid: FloatArray, chart_of: IntArray, faces: IntArray) -> FloatArray:

@@ -67,6 +67,16 @@ def xatlas_fill(given: Charted) -> float:
     return np.abs(doubled_areas(own, corners)).sum() / 2 / max(atlas.width, atlas.height) ** 2
 
 
+@pytest.mark.parametrize("count", [12, 40])
+def test_charts_far_apart_are_packed_as_densely(count) -> None:
+    given = flags(count)
+    steps = np.arange(4 * count) // 4
+    uv = given.map.uv + np.outer(1000 * steps, [1, -1])
+    made = packed(Charted(given.mesh, Parameterization(uv, given.map.corners)))
+    filled = np.abs(doubled_areas(made.map.uv, made.map.corners)).sum() / 2
+    assert filled > 0.8 * xatlas_fill(given)
+
+
 def test_a_chart_alone_is_turned_to_its_smallest_square() -> None:
     turn = np.array([[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]])
     uv = np.array([[0, 0], [3, 0], [3, 3], [0, 3]]) @ turn
