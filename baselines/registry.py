@@ -61,6 +61,8 @@ METHODS: dict[str, str] = {
     "parapoint": "parapoint.learned.parapoint:ParaPoint",
     "computed": "parapoint.computed.computed_map:ComputedMap",
     "fam": "baselines.neural.fam:FAM",
+    "foldingnet": "baselines.neural.foldingnet:FoldingNet",
+    "atlasnet": "baselines.neural.atlasnet:AtlasNet",
     "nuvo": "baselines.neural.nuvo:Nuvo",
 }
 """Name -> "module:Class" of each method that comes with the benchmark."""
