@@ -41,9 +41,28 @@ def test_each_row_of_the_table_is_measured(monkeypatch) -> None:
     small = {"PRODUCT": 32, "STEPS": (100,), "MAPPED": 300, "FEWEST_ROUNDS": 1, "ENOUGH": 0.0}
     for name, value in small.items():
         monkeypatch.setattr(speed, name, value)
+    asked, products = [], speed._products
+
+    def noted(*given, **how):
+        asked.append((*given, how))
+        return products(*given, **how)
+
+    monkeypatch.setattr(speed, "_products", noted)
     rows = speed.training_rates()
     assert len(rows) == 5
+    assert rows[0].gflops == pytest.approx(2 * 32**3 / rows[0].cpu_seconds / 1e9)
+    assert rows[0].fraction == 1
+    # A step of 100 points has a lattice of as many, of which Wrap takes three rows each.
+    assert [(count, how["backward"]) for _, count, how in asked[::2]] == [(600, True)] * 2
+    assert [how["backward"] for _, _, how in asked[1::2]] == [False] * 2
     assert all(row.fraction > 0 and row.cpu_seconds > 0 for row in rows)
     assert np.isnan(rows[0].bare_fraction)
     assert all(row.bare_fraction > 0 for row in rows[1:])
     assert speed.training_table().row_count == 5
+
+
+@pytest.mark.parametrize(("backward", "times"), [(False, 1), (True, 3)])
+def test_operations_of_layers_are_two_for_each_weight_and_row(backward, times) -> None:
+    work = speed._products((4, 5), 10, backward=backward)
+    assert work.operations == times * 2 * 10 * (3 * 4 + 4 * 5 + 5 * 3)
+    work.run()

@@ -1,12 +1,18 @@
 """The picture of a textured mesh, part by part, with known answers."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from benchmarks.cases import builtin
 from parapoint import Mesh, Parameterization
 from parapoint.surfaces.parameterization import Charted
 from parapoint.textures import preview as room
+from parapoint.textures.checkerboard import checkerboard
+
+GOLDEN = Path(__file__).parents[2] / "golden" / "preview.txt"
 
 RED, GREEN, BLUE, GREY = [255, 0, 0], [0, 255, 0], [0, 0, 255], [90, 90, 90]
 TEXTURE = np.array([[RED, GREEN], [BLUE, GREY]], dtype=np.uint8)
@@ -84,3 +90,17 @@ def test_what_points_upwards_is_seen_above() -> None:
     seen = room.preview(of_y, TEXTURE, is_y_up=True)
     assert_array_equal(seen, room.preview(of_z, TEXTURE))
     assert (seen != room.preview(of_y, TEXTURE)).any()
+
+
+def test_a_preview_looks_as_it_did_when_somebody_looked(monkeypatch) -> None:
+    """Mean tones of 8 by 24 parts of the picture of a torus, within three levels of 255."""
+    monkeypatch.setattr(room, "SIDE", 96)
+    monkeypatch.setattr(room, "SAMPLES", 200_000)
+    mesh = builtin.torus(24)
+    x, y, z = (0.5 + 0.3 * of for of in mesh.vertices[mesh.faces].reshape(-1, 3).T)
+    uv = np.column_stack([x, np.where(z > 0.5, y, 1 - y)])
+    apart = np.arange(len(uv)).reshape(-1, 3)
+    shown = room.preview(Charted(mesh, Parameterization(uv, apart)), checkerboard(8, 4))
+    assert shown.shape == (96, 288, 3)
+    tones = shown.reshape(8, 12, 24, 12, 3).mean(axis=(1, 3, 4))
+    assert_allclose(tones, np.loadtxt(GOLDEN), atol=3)
