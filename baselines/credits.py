@@ -61,6 +61,8 @@ CREDITS = {
     "parapoint": Credit(OURS, ("zhang2024parapoint",)),
     "computed": Credit(LIBIGL, ("libigl",)),
     "fam": Credit(OURS, ("zhang2024fam",)),
+    "foldingnet": Credit(OURS, ("yang2018",)),
+    "atlasnet": Credit(OURS, ("groueix2018",)),
     "nuvo": Credit(OURS, ("srinivasan2023",)),
 }
 """By registry name. A plugin says its own as class attributes, `licence` and `citation`."""

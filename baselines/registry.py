@@ -27,6 +27,7 @@ from baselines.credits import CREDITS, cited
 from parapoint import sources
 from parapoint.errors import InputError
 from parapoint.method import REPAIRED, REQUIREMENTS, Method
+from parapoint.parameters import LARGEST_SEED
 
 METHODS: dict[str, str] = {
     "tutte": "baselines.disks.tutte:Tutte",
@@ -60,6 +61,8 @@ METHODS: dict[str, str] = {
     "parapoint": "parapoint.learned.parapoint:ParaPoint",
     "computed": "parapoint.computed.computed_map:ComputedMap",
     "fam": "baselines.neural.fam:FAM",
+    "foldingnet": "baselines.neural.foldingnet:FoldingNet",
+    "atlasnet": "baselines.neural.atlasnet:AtlasNet",
     "nuvo": "baselines.neural.nuvo:Nuvo",
 }
 """Name -> "module:Class" of each method that comes with the benchmark."""
@@ -306,8 +309,10 @@ def _checked(value: object, hint: Any, what: str) -> object:
     """`value` as a parameter of type `hint`: an int will do for a float, a list for a tuple.
 
     Raises:
-        InputError: it has another type.
+        InputError: it has another type, or too many digits.
     """
+    if isinstance(value, int) and not -LARGEST_SEED <= value <= LARGEST_SEED:
+        raise InputError(f"{what} is a number that 64 bits do not hold")
     if hint is Any:
         return value
     kind, options = get_origin(hint), get_args(hint)

@@ -80,8 +80,8 @@ def _seeds(_: click.Context, __: click.Parameter, text: str | None) -> list[int]
     """The value of an option that is a list of seeds."""
     if text is None:
         return None
-    if not all(part.isascii() and part.isdigit() for part in split(text)):
-        raise InputError(f"seeds are whole numbers from 0, such as 0,1,2; not {text!r}")
+    if not all(part.isascii() and part.isdigit() and len(part) < 30 for part in split(text)):
+        raise InputError(f"seeds are whole numbers from 0, such as 0,1,2; not {text[:100]!r}")
     return [int(part) for part in split(text)]
 
 
@@ -239,7 +239,7 @@ for name, place, summary in (
 )
 @click.option(
     "--seconds",
-    type=click.FloatRange(min=0, min_open=True),
+    type=float,
     default=180.0,
     show_default=True,
     help="Processor time of each way in the race.",
@@ -250,7 +250,9 @@ def speed(figure: Path | None, race: str | None, seconds: float) -> None:
     from benchmarks.commands.metric_speed import growth_figure, metric_costs, metric_table
     from benchmarks.commands.speed import training_table
     from benchmarks.commands.tables import print_table
+    from parapoint.parameters import LONGEST_SECONDS, check_number
 
+    check_number("--seconds", seconds, most=LONGEST_SECONDS, above=True)
     if race is not None:
         from benchmarks.checks.straightforward import race_table
 

@@ -57,6 +57,8 @@ DISPLAY: dict[str, tuple[str, str]] = {
     "external": ("External", ""),
     "meshed": ("Meshed", ""),
     "textured": ("Textured", ""),
+    "foldingnet": ("FoldingNet", ""),
+    "atlasnet": ("AtlasNet", ""),
     "fam": ("FAM", ""),
     "artist+slim": ("Artist's cut + SLIM", ""),
     "seamster": ("Seamster + SLIM", ""),

@@ -222,6 +222,8 @@ SUITES: dict[str, Suite] = {
                 "computed(time_budget=60)",
                 "parapoint(preset=paper, time_budget=60)",
                 "parapoint(preset=learned, time_budget=60)",
+                "foldingnet(time_budget=60)",
+                "atlasnet(time_budget=60)",
                 "fam(points=4096, subset=256, time_budget=60)",
                 "nuvo(points=4096, subset=256, time_budget=60)",
             ),

@@ -17,7 +17,7 @@ from parapoint.computed.parts import DISTORTIONS, Distortion
 from parapoint.computed.reconstruction import ReconstructionError
 from parapoint.estimator import Estimator
 from parapoint.fitting import Fitted, Progress, Session
-from parapoint.parameters import check_choice, check_whole
+from parapoint.parameters import LARGEST_SEED, check_choice, check_whole
 from parapoint.surfaces.frame import Frame
 from parapoint.surfaces.sampling import (
     COINCIDENT,
@@ -87,7 +87,7 @@ class ComputedMap(Estimator):
     def check(self) -> None:
         """See `Estimator`."""
         super().check()
-        check_whole("points", self.points, FEWEST_POINTS)
+        check_whole("points", self.points, FEWEST_POINTS, LARGEST_SEED)
         check_choice("distortion", self.distortion, DISTORTIONS)
 
     def fit_part(self, surface: Surface, share: float, session: Session) -> Fitted:

@@ -43,7 +43,10 @@ def surface_or_array(given: Any) -> Surface | npt.NDArray[Any]:
 def _dense(given: Any) -> npt.NDArray[Any]:
     if sparse.issparse(given):
         raise InputError("sparse input is not supported; take a dense array of coordinates")
-    array = np.asarray(given)
+    try:
+        array = np.asarray(given)
+    except ValueError as error:  # rows of different lengths
+        raise InputError(f"points must be numbers: {error}") from None
     if np.iscomplexobj(array):
         raise InputError("Complex data not supported: coordinates are real numbers")
     return array

@@ -84,7 +84,10 @@ def fitted_rows(given: npt.ArrayLike | Surface) -> tuple[Surface, dict[str, obje
 
 def _finite(given: npt.ArrayLike) -> PointCloud:
     """The cloud of the finite rows of an array; the number of others is logged."""
-    points = np.asarray(given, dtype=np.float64)
+    try:
+        points = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"points must be numbers: {error}") from None
     if points.ndim != 2 or points.shape[1] != 3:
         raise InputError(f"points must have shape (n, 3), not {points.shape}")
     finite = np.isfinite(points).all(axis=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -52,7 +53,9 @@ def _inline(content: object) -> Markup:
     return Markup(text.replace("<", "\\u003c"))  # noqa: S704  # no < is left
 
 
+@functools.cache
 def _templates() -> Environment:
+    """The templates of all pages, each compiled once."""
     return Environment(
         loader=PackageLoader("reports.page"),
         autoescape=select_autoescape(default=True, default_for_string=True),

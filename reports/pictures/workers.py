@@ -6,6 +6,7 @@ import logging
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from typing import TypeVar
 
@@ -26,6 +27,9 @@ def done_by_several(
         work: the arguments of each call.
         jobs: how many processes share the work. Where the system has no room for what they would
             share, as with a full /dev/shm, this process does it alone.
+
+    Raises:
+        ChildProcessError: one of them was killed.
     """
     pool = _pool(min(jobs, len(work)))
     if pool is None:
@@ -34,7 +38,13 @@ def done_by_several(
         return
     with pool:
         for pending in [pool.submit(make, *arguments) for arguments in work]:
-            yield pending.result()
+            try:
+                yield pending.result()
+            except BrokenProcessPool:
+                raise ChildProcessError(
+                    "a process that draws was killed, perhaps for its memory; the same command "
+                    "draws what is missing"
+                ) from None
 
 
 def _begin(parent: int, decoded: float) -> None:

@@ -24,6 +24,8 @@ ARGUMENTS = {
     "textured": {"texels": 64},
     "external": {"command": COPY},
     "fam": {"points": 120, "subset": 100, "iterations": 2},
+    "foldingnet": {"points": 120, "subset": 100, "iterations": 2},
+    "atlasnet": {"points": 120, "subset": 100, "iterations": 2, "charts": 3},
     "nuvo": {"points": 120, "subset": 100, "iterations": 2},
     "geometry_image": {"side": 17},
     "smith_schaefer": {"iterations": 60},

@@ -75,6 +75,12 @@ def test_none_takes_the_preset_s_value() -> None:
         ({"all_from": 1.5}, "all_from must be a number of at least 0 and at most 1"),
         ({"seed": -1}, "seed must be"),
         ({"device": "abacus"}, "device must be auto, cpu or cuda"),
+        ({"distortion": np.zeros(2)}, "distortion must be one of"),
+        ({"components": ["largest"]}, "components must be one of"),
+        ({"points": 10**5000}, "points must be a whole number"),
+        ({"iterations": 10**23}, "iterations must be a whole number"),
+        ({"threads": 10**6}, "threads must be a whole number"),
+        ({"distortion_weight": 1e308}, "distortion_weight must be a number"),
     ],
 )
 def test_a_wrong_parameter_is_one_line(parameters: dict[str, object], message: str) -> None:
@@ -90,6 +96,8 @@ def test_a_wrong_parameter_is_one_line(parameters: dict[str, object], message: s
         (np.outer(np.linspace(0, 1, 500), [1.0, 2.0, 3.0]), "along a curve"),
         (np.full((500, 3), math.nan), "at least one point"),
         (np.zeros((500, 2)), r"shape \(n, 3\)"),
+        ("x", "points must be numbers"),
+        ([[1, 2, 3], [4, 5]], "points must be numbers"),
     ],
 )
 def test_points_that_are_no_surface_are_one_line(points: np.ndarray, message: str) -> None:

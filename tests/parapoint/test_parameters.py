@@ -48,6 +48,17 @@ def test_a_number_above_a_bound_is_not_the_bound():
             check_number("x", value)
 
 
+@pytest.mark.parametrize("digits", [400, 5000])
+def test_numbers_of_any_length_are_named(digits):
+    value = 10**digits
+    for check in (check_whole, check_number):
+        with pytest.raises(InputError, match=r"^x must be") as error:
+            check("x", value, 0, 7)
+        assert len(str(error.value)) < 300
+    with pytest.raises(InputError, match=r"^x must be one of a"):
+        check_choice("x", value, ("a",))
+
+
 def test_choices_are_told():
     check_choice("kind", "a", ("a", "b"))
     with pytest.raises(InputError, match=r"^kind must be one of a, b, not 'c'$"):

@@ -34,6 +34,11 @@ def test_a_full_dev_shm_leaves_one_process(
     assert "one process draws alone: No space left on device" in caplog.text
 
 
+def test_a_worker_that_is_killed_is_one_line() -> None:
+    with pytest.raises(ChildProcessError, match="a process that draws was killed, perhaps for"):
+        list(done_by_several(os._exit, [(1,), (2,)], 2))
+
+
 SLEEPERS = """
 import pathlib, os, time
 from reports.pictures.workers import done_by_several
