@@ -103,3 +103,11 @@ def test_the_surface_ends_four_spacings_from_the_points():
     reach = 4 * (4 + 2 * np.sqrt(2)) / 6
     vertices = np.array([[4, 4, 0.99 * reach], [4, 4, 1.01 * reach], [4, 4, -0.99 * reach]])
     assert_array_equal(_near(vertices, points.reshape(-1, 3)), [True, False, True])
+
+
+def test_the_mesh_of_a_cloud_comes_with_its_map():
+    pytest.importorskip("pymeshlab")
+    _, cloud = half_cylinder(400)
+    method = registry.method("meshed(reconstruction=ball_pivoting, flattening=lscm)")[1]
+    made = method.charted(cloud, seed=0)
+    assert len(made.mesh.faces) == len(made.map.corners) > 100
