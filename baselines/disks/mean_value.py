@@ -20,7 +20,7 @@ class MeanValue:
     """Mean-value embedding: positive weights that follow the shape, a circle as the boundary.
 
     M. S. Floater 2003, "Mean value coordinates". Each inner vertex is a convex combination of its
-    neighbours with the weights of equation 2.2,
+    neighbours with the weights
 
         w_ij = (tan(a / 2) + tan(b / 2)) / |v_i - v_j|,
 

@@ -34,7 +34,7 @@ def relaxed(disk: Domain, uv: FloatArray) -> Iterator[FloatArray]:
     """The maps (V, 2) after `uv` as the stretch falls, the boundary held.
 
     A neighbour whose triangles are stretched in space by q pulls with its weight over q: what is
-    too small in the plane grows (equation 3 of Yoshizawa et al.).
+    too small in the plane grows (Yoshizawa et al. 2004).
     """
     weights, area = mean_value_weights(disk), Mesh(disk.vertices, disk.faces).face_areas
     around = np.bincount(disk.faces.reshape(-1), np.repeat(area, 3), len(uv))

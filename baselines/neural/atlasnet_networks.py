@@ -20,7 +20,7 @@ class AtlasNetworks(Sheets):
         super().__init__([Stack(2, 3, HIDDEN, activation, generator) for _ in range(charts)])
 
     def terms(self, given: Tensor, count: int, generator: torch.Generator) -> dict[str, Tensor]:
-        """The Chamfer distance: squared distances to the nearest, both ways (equation 3)."""
+        """The Chamfer distance: squared distances to the nearest, both ways."""
         each = -(-count // len(self.sheets))
         made = torch.cat([sheet(random_places(each, generator)[None])[0] for sheet in self.sheets])
         return {"chamfer": chamfer(made, given)}

@@ -31,6 +31,6 @@ class FoldingNetworks(Sheets):
     """One sheet."""
 
     def terms(self, given: Tensor, count: int, generator: torch.Generator) -> dict[str, Tensor]:
-        """The larger of the mean distances of either set to the other (equation 1)."""
+        """The larger of the mean distances of either set to the other."""
         made = self.sheets[0](random_places(count, generator)[None])[0]
         return {"chamfer": wrap_loss(made, given)}
