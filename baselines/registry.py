@@ -115,7 +115,7 @@ def method(spec: str) -> tuple[str, Method]:
         InputError: the spec cannot be read; there is no such method or parameter (near names are
             given); a value has the wrong type.
     """
-    name, arguments = _parsed(spec)
+    name, arguments = parsed(spec)
     kind = _class(name)
     hints = get_type_hints(kind)
     known = {field.name: hints[field.name] for field in fields(cast("Any", kind)) if field.init}
@@ -272,7 +272,7 @@ def imports(made: Method | type[Method], package: str) -> bool:
     return False
 
 
-def _parsed(spec: str) -> tuple[str, dict[str, Any]]:
+def parsed(spec: str) -> tuple[str, dict[str, Any]]:
     """The name and the arguments in a spec.
 
     Raises:

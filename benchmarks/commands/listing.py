@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from rich.table import Table
 from rich.text import Text
@@ -23,15 +23,25 @@ def _add(table: Table, *texts: str) -> None:
     table.add_row(*map(Text, texts))
 
 
+def _parameters(spec: str) -> tuple[str, Mapping[str, object]]:
+    """The name and parameters of a method; of one that is not installed, those in its spec."""
+    from baselines import registry
+    from benchmarks.running.planning import parameters
+
+    try:
+        return parameters(spec)
+    except InputError:
+        return registry.parsed(spec)
+
+
 def suites() -> Table:
     """Each suite with its cases and methods, and how long it takes on one core, about."""
     from benchmarks.cases.suites import SUITES
     from benchmarks.running.expectation import about, expectation
-    from benchmarks.running.planning import parameters
 
     table = _table("suite", "title", "cells", "one core", "download", "cases", "methods", "seeds")
     for suite in SUITES.values():
-        needs = expectation(suite, parameters)
+        needs = expectation(suite, _parameters)
         _add(
             table,
             suite.name,

@@ -104,7 +104,12 @@ def choice(
     """
     added = [registry.register_plugin(plugin) for plugin in plugins]
     chosen = []
-    made = [(spec, *registry.method(spec)) for spec in dict.fromkeys(methods or suite.methods)]
+    try:
+        made = [(spec, *registry.method(spec)) for spec in dict.fromkeys(methods or suite.methods)]
+    except InputError as error:
+        if methods:
+            raise
+        raise InputError(f"{error}; or name methods that do without, with --methods") from None
     named = {name for _, name, _ in made}
     made += [(name, *registry.method(name)) for name in added if name not in named]
     for spec, name, method in made:

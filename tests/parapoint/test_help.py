@@ -136,6 +136,18 @@ def test_where_torch_is_missing_one_line_says_what_would_do(program, words, tmp_
     assert not list(tmp_path.iterdir())
 
 
+def test_without_torch_a_suite_tells_the_way_without_it(tmp_path):
+    done = without_torch(BENCHMARKS, ["run", "smoke"], tmp_path)
+    assert "--methods" in done.stderr
+    spec = ["run", "--methods", "fam", "--cases", "saddle"]
+    assert "--methods" not in without_torch(BENCHMARKS, spec, tmp_path).stderr
+
+
+def test_without_torch_the_list_of_suites_is_the_same(tmp_path, capsys):
+    done = without_torch(BENCHMARKS, ["list", "suites"], tmp_path)
+    assert ended(benchmarks.main, ["list", "suites"], capsys) == (0, done.stdout, "")
+
+
 def test_without_torch_everything_else_is_listed(tmp_path):
     done = without_torch(BENCHMARKS, ["list", "methods"], tmp_path)
     lines = {line.split("\t")[0]: line for line in done.stdout.splitlines()}
