@@ -131,7 +131,7 @@ def run(
     strict: bool,
     **options: Any,
 ) -> None:
-    """Run the cells of SUITE (default: paper) that the results folder lacks.
+    """Run SUITE (default: paper), or what its results lack.
 
     A second run goes on where the first one ended. Results of all runs stay in the folder.
     """
@@ -182,7 +182,10 @@ def _shown_run(suite: Suite, out: Path, **options: Any) -> Summary:
 @main.command("list", no_args_is_help=True)
 @click.argument("what", type=click.Choice(["suites", "cases", "methods", "metrics"]))
 def list_(what: str) -> None:
-    """Show what there is: a table on a terminal, tab-separated values in a pipe."""
+    """List suites, cases, methods or metrics.
+
+    A terminal shows them as a table, and a pipe gets tab-separated values.
+    """
     from benchmarks.commands.listing import LISTS
     from benchmarks.commands.tables import entries, print_table
 
@@ -193,7 +196,10 @@ def list_(what: str) -> None:
 @click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
 @click.pass_context
 def check(ctx: click.Context, folder: Path) -> None:
-    """Verify every row of a results folder against its files, and a sample of its metrics."""
+    """Verify the rows of a results folder.
+
+    Every row is held against its files, and a sample of the metrics is computed anew.
+    """
     from benchmarks.store import verifying
     from benchmarks.store.results import Store
 
@@ -245,7 +251,10 @@ for name, place, summary in (
     help="Processor time of each way in the race.",
 )
 def speed(figure: Path | None, race: str | None, seconds: float) -> None:
-    """How fast the heavy parts are, measured now: metrics, methods, and ParaPoint's training."""
+    """Measure how fast the heavy parts are.
+
+    These are the metrics, what a run adds to its methods, and ParaPoint's training.
+    """
     from benchmarks.commands.method_speed import overhead_table, overheads
     from benchmarks.commands.metric_speed import growth_figure, metric_costs, metric_table
     from benchmarks.commands.speed import training_table

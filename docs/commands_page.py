@@ -18,7 +18,8 @@ PROGRAMS: dict[str, click.Command] = {
 
 def helps(name: str, command: click.Command) -> list[str]:
     """The help of a command and of its subcommands, as Markdown."""
-    with click.Context(command, info_name=name, max_content_width=88) as context:
+    settings = {**command.context_settings, "max_content_width": 88}
+    with click.Context(command, info_name=name, **settings) as context:
         found = [f"## {name}\n\n```text\n{command.get_help(context)}\n```\n"]
         if isinstance(command, click.Group):
             for word in command.list_commands(context):

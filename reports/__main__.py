@@ -31,7 +31,7 @@ def main() -> None:
 
 @main.command(
     help=(
-        "Write tables, figures and index.html for the results in DIR to DIR/report. With "
+        "Write tables, figures and a page for DIR. They go to DIR/report, with index.html. With "
         "--against, write what moved since OTHER to DIR/report/history instead."
     ),
 )
@@ -63,9 +63,10 @@ def report(folder: Path, exports: bool, against: tuple[Path, ...]) -> None:
 @click.argument("sources", metavar="DIR...", nargs=-1, required=True, type=PATH)
 @click.option("--out", default="site", show_default=True, type=PATH, help="Folder of the site.")
 def site(sources: tuple[Path, ...], out: Path) -> None:
-    """Write the static site of results folders or archives, the oldest first.
+    """Write a static site of several results.
 
-    Of a cell in several, the newest is shown; the history says what moved.
+    DIR is a results folder or an archive; give the oldest first. Of a cell in several, the newest
+    is shown; the history says what moved.
     """
     from reports.progress import Shown
     from reports.site import building
@@ -79,7 +80,10 @@ def site(sources: tuple[Path, ...], out: Path) -> None:
 @click.argument("sources", metavar="DIR...", nargs=-1, required=True, type=PATH)
 @click.option("--out", default="docs/RESULTS.md", show_default=True, type=PATH)
 def markdown(sources: tuple[Path, ...], out: Path) -> None:
-    """Write the results of some folders as one page of Markdown, with commit, machine and load."""
+    """Write results as one page of Markdown.
+
+    The page names the commit, the machine and its load for each of the folders.
+    """
     from reports.site.markdown import write
 
     print(write(sources, out))

@@ -34,7 +34,7 @@ def write(sources: Sequence[Path], out: Path) -> Path:
     parts = [
         f"{MARK}change the results, not this page. -->",
         "# Reference results",
-        f"Made by `{command}`. Validity comes before rank (README, *How to read the tables*).",
+        f"Made by `{command}`. Validity comes before rank (METRICS.md, *Grades*).",
         *(part for suite in suites for part in _suite(suite)),
     ]
     out.parent.mkdir(parents=True, exist_ok=True)
