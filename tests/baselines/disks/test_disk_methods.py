@@ -1,5 +1,6 @@
 """Known answers and invariances of the methods for disks."""
 
+import igl
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -360,6 +361,28 @@ def test_arap_traces_some_steps_and_the_last():
     energies = [point.values["arap"] for point in result.trace]
     assert energies == sorted(energies, reverse=True)
     assert result.report["end_energy"] == energies[-1]
+
+
+def test_arap_takes_as_many_steps_as_its_trace_says():
+    """A run that ends at a step has the map that a longer one keeps of that step."""
+    longer = mapped("arap(iterations=12)", irregular_disk()).trace
+    for point in longer[:-1]:
+        shorter = mapped(f"arap(iterations={point.iteration})", irregular_disk())
+        assert_allclose(shorter.uv, point.uv, atol=1e-9)
+    apart = igl_steps(irregular_disk(), 12)
+    assert_allclose(longer[-1].uv, apart, atol=1e-9)
+
+
+def igl_steps(mesh, count):
+    """The map after that many calls of libigl, a step each."""
+    disk = domain(mesh)
+    held, solver, uv = disk.loop[:1], igl.ARAPData(), tutte(disk)
+    place = uv[held]
+    igl.arap_precomputation(disk.vertices, disk.faces, 2, held.astype(np.int32), solver)
+    solver.max_iter = 1
+    for _ in range(count):
+        uv = igl.arap_solve(place, solver, uv)
+    return uv
 
 
 @pytest.mark.parametrize("start", range(4))
