@@ -57,9 +57,13 @@ class Store(Files):
         """The latest row of each cell, in the order in which the cells first ran.
 
         A row of an older source or surface gives way to the newer one of the same suite, case,
-        method, parameters and seed; `history()` has both.
+        method, parameters and seed; `history()` has both. An id is one cell's: further cells that
+        claim it, in lines that somebody changed, have no row.
         """
-        return list({row.cell: row for row in self.history()}.values())
+        by_id: dict[str, ResultRow] = {}
+        for row in {row.cell: row for row in self.history()}.values():
+            by_id.setdefault(row.id, row)
+        return list(by_id.values())
 
     def append(self, row: ResultRow) -> None:
         """Write a row, inside `writing()`: all of it or nothing.

@@ -29,6 +29,18 @@ def test_the_latest_row_of_a_cell_counts_and_none_is_lost(store):
     assert store.result(old).uv.shape == (4, 2)
 
 
+def test_an_id_is_of_one_cell_and_the_first_keeps_it(store):
+    """A line that somebody changed may claim the id of another cell."""
+    first = add(store)
+    store.append(dataclasses.replace(first, case="claims"))
+    last = add(store, case="other")
+    assert [(row.id, row.case) for row in store.rows()] == [
+        (first.id, "square"),
+        (last.id, "other"),
+    ]
+    assert len(store.history()) == 3
+
+
 def test_the_identity_covers_every_part_and_no_order():
     cell = {
         "suite": "a",
