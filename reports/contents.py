@@ -28,6 +28,7 @@ from reports.ranking import TIMES, worst
 
 ANGLE, AREA = "angle_difference_mean", "area_discrepancy_total"
 FLIPPED, SPANNING = "flipped_fraction", "spanning_fraction"
+FLIPPED_OFF_SEAM = f"{FLIPPED}_without_spanning"
 WORST_PART = "part_area_ratio_min_without_spanning"
 SHEETS = 12
 """Most models of a report in which each has figures of its own, and all pictures for them."""

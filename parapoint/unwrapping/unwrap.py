@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import logging
 import math
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -216,7 +219,8 @@ class Unwrap:
             budget = SHARE_OF_SEAM * max(deadline - time.monotonic(), LEAST_TIME)
         computed = ComputedMap(points, distortion="conformal", time_budget=budget)
         try:
-            learned = computed.parameterize(mesh, seed=seed)
+            with _unsaid("parapoint.computed.computed_map"):
+                learned = computed.parameterize(mesh, seed=seed)
         except ReconstructionError as error:
             seam = np.zeros(len(mesh.edges), dtype=bool)
             return seam if mesh.is_planar_domain else disk_cut(mesh), {"failed": str(error)}
@@ -230,6 +234,17 @@ class Unwrap:
         unit = of_area_one(run.mesh.vertices, run.mesh.faces)
         uv = towards_conformal(unit, run.uv / run.unit, run.deadline, most_starved)
         run.take(run.unit * uv, run.start)
+
+
+@contextlib.contextmanager
+def _unsaid(module: str) -> Iterator[None]:
+    """Leave unsaid what a module warns of: here of points that nobody but us has drawn."""
+    logger = logging.getLogger(module)
+    before, logger.disabled = logger.disabled, True
+    try:
+        yield
+    finally:
+        logger.disabled = before
 
 
 def _enough_points(mesh: Mesh) -> int:

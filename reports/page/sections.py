@@ -19,7 +19,7 @@ from benchmarks.running import planning
 from benchmarks.store.rows import SUBMITTED, ResultRow
 from parapoint.errors import InputError
 from parapoint.surfaces.surface import Mesh
-from reports.contents import AREA, FLIPPED, SHEETS, Contents, Label, number, suite_title
+from reports.contents import AREA, FLIPPED_OFF_SEAM, SHEETS, Contents, Label, number, suite_title
 from reports.pictures import exports
 from reports.pictures.figures import Drawn
 from reports.pictures.names import VIEWED, map_file, model_file, slug
@@ -198,18 +198,18 @@ class Section:
         }
 
     def _example(self, case: str, label: Label) -> Example:
-        """The map of a method on a model, small, with its grade and flips."""
+        """The map of a method on a model, small, with its grade and the flips that this counts."""
         row = self.contents.shown(case, label)
         if row is None:
             rows = self.contents.cell(case, label)
             return Example(label.short, (), rows[0].status.replace("_", " ") if rows else "", "bad")
         kinds = ["dense" if case in self.contents.clouds else TILES["surface"]]
         values = self._values[row.id]
-        flipped = number({FLIPPED: values[FLIPPED]}, FLIPPED) or 0
+        flipped = number(values, FLIPPED_OFF_SEAM) or 0
         if flipped:
             kinds.append("checker-2")
         pictures = [self.picture(map_file(row, kind)) for kind in kinds]
-        told = f"{metric_column(FLIPPED).shown(flipped)} % flipped" if flipped else ""
+        told = f"{metric_column(FLIPPED_OFF_SEAM).shown(flipped)} % flipped" if flipped else ""
         grade = str(values["grade"] or "")
         said = ", ".join(part for part in (grade, told) if part)
         mark = "bad" if grade in {"broken", "collapsed"} else ""

@@ -1,12 +1,17 @@
 """Maps along seams that are given."""
 
+import logging
+
 import numpy as np
 import pytest
 
 from benchmarks.metrics.evaluation import evaluate
 from parapoint import InputError, Mesh
+from parapoint.computed import computed_map
+from parapoint.computed.reconstruction import ReconstructionError
 from parapoint.testing import irregular_disk, sphere
 from parapoint.unwrapping.given import unwrapped_along
+from parapoint.unwrapping.unwrap import Unwrap
 
 NONE = np.zeros((0, 2), dtype=np.int64)
 
@@ -42,3 +47,18 @@ def test_faces_that_do_not_turn_alike_are_refused() -> None:
     faces[0] = faces[0, ::-1]
     with pytest.raises(InputError, match="seams can be given for a manifold"):
         unwrapped_along(Mesh(disk.vertices, faces), NONE)
+
+
+def test_what_is_said_of_points_that_nobody_gave_stays_unsaid(monkeypatch, caplog):
+    """A closed mesh is opened along a map of points that are drawn from it."""
+
+    def parameterize(*_, **__):
+        logging.getLogger(computed_map.__name__).warning("30 of 6000 points are off")
+        raise ReconstructionError("no surface")
+
+    monkeypatch.setattr(computed_map.ComputedMap, "parameterize", parameterize)
+    result = Unwrap(time_budget=5).parameterize(sphere(), seed=0)
+    assert len(result.uv) > 0
+    assert not caplog.records
+    logging.getLogger(computed_map.__name__).warning("heard again")
+    assert [record.message for record in caplog.records] == ["heard again"]
