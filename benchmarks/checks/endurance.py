@@ -54,7 +54,14 @@ TIMING = ("seconds", "cpu_seconds", "load", "peak_memory_mb", "run")
 CASES = ("half_cylinder", "saddle@noise=0")
 """A mesh and a cloud, so that every method has a surface that it can take."""
 BUDGETS = {
-    **dict.fromkeys(("parapoint", "fam", "nuvo"), "points=120, subset=100, iterations=2"),
+    **dict.fromkeys(
+        ("parapoint", "fam", "nuvo", "foldingnet", "atlasnet"),
+        "points=120, subset=100, iterations=2",
+    ),
+    "computed": "points=500",
+    "geometry_image": "side=17",
+    "meshed": "reconstruction=ball_pivoting",
+    "smith_schaefer": "iterations=60",
     "unwrap": "points=120",
 }
 """Parameters that make those methods short that would take minutes."""
