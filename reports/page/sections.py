@@ -19,7 +19,16 @@ from benchmarks.running import planning
 from benchmarks.store.rows import SUBMITTED, ResultRow
 from parapoint.errors import InputError
 from parapoint.surfaces.surface import Mesh
-from reports.contents import AREA, FLIPPED_OFF_SEAM, SHEETS, Contents, Label, number, suite_title
+from reports.contents import (
+    AREA,
+    FLIPPED,
+    FLIPPED_OFF_SEAM,
+    SHEETS,
+    Contents,
+    Label,
+    number,
+    suite_title,
+)
 from reports.pictures import exports
 from reports.pictures.figures import Drawn
 from reports.pictures.names import VIEWED, map_file, model_file, slug
@@ -209,7 +218,7 @@ class Section:
         if flipped:
             kinds.append("checker-2")
         pictures = [self.picture(map_file(row, kind)) for kind in kinds]
-        told = f"{metric_column(FLIPPED_OFF_SEAM).shown(flipped)} % flipped" if flipped else ""
+        told = f"{metric_column(FLIPPED).shown(flipped)} % flipped" if flipped else ""
         grade = str(values["grade"] or "")
         said = ", ".join(part for part in (grade, told) if part)
         mark = "bad" if grade in {"broken", "collapsed"} else ""
