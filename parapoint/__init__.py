@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from parapoint.surfaces.parameterization import Parameterization, PointParameterization
     from parapoint.surfaces.surface import Mesh, PointCloud
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 __all__ = [
     "ComputedMap",
     "InputError",
