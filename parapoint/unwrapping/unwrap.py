@@ -21,6 +21,7 @@ from parapoint.method import UnsupportedError
 from parapoint.parameters import LONGEST_SECONDS, check_choice, check_number
 from parapoint.planar.coarse import LARGE, grown_as_coarse
 from parapoint.planar.descent import LEAST_ENERGY, Run, sound
+from parapoint.planar.domains import FlatteningError
 from parapoint.planar.embedding import embeddable
 from parapoint.planar.growth import PRICE, Need, grown
 from parapoint.planar.scaffold import of_area_one
@@ -152,7 +153,8 @@ class Unwrap:
         run = None
         if self._grows and mesh.is_planar_domain:
             half = time.monotonic() + (deadline - time.monotonic()) / 2
-            run = self._grown(mesh, seam, deadline if self.max_distortion is None else half)
+            with contextlib.suppress(FlatteningError):  # too thin for a start: it is cut first
+                run = self._grown(mesh, seam, deadline if self.max_distortion is None else half)
         if run is None or (self.max_distortion is not None and self._is_cut_or_in_need(run)):
             seam, computed = self._seam(mesh, seed, deadline)
             other = self._grown(mesh, seam, deadline)

@@ -9,6 +9,8 @@ from benchmarks.metrics.evaluation import evaluate
 from parapoint import InputError, Mesh
 from parapoint.computed import computed_map
 from parapoint.computed.reconstruction import ReconstructionError
+from parapoint.planar import descent
+from parapoint.planar.domains import FlatteningError
 from parapoint.testing import irregular_disk, sphere
 from parapoint.unwrapping.given import unwrapped_along
 from parapoint.unwrapping.unwrap import Unwrap
@@ -62,3 +64,21 @@ def test_what_is_said_of_points_that_nobody_gave_stays_unsaid(monkeypatch, caplo
     assert not caplog.records
     logging.getLogger(computed_map.__name__).warning("heard again")
     assert [record.message for record in caplog.records] == ["heard again"]
+
+
+def test_a_disk_that_has_no_start_is_cut_first(monkeypatch):
+    """As a tube so thin that Tutte's embedding of its end collapses."""
+    begin, calls = descent.Run.begin, []
+
+    def first_fails(run):
+        calls.append(len(run.mesh.vertices))
+        if len(calls) == 1:
+            raise FlatteningError("collapsed")
+        begin(run)
+
+    monkeypatch.setattr(descent.Run, "begin", first_fails)
+    disk = irregular_disk()
+    result = Unwrap(points=120).parameterize(disk, seed=0)
+    assert len(calls) >= 2
+    assert "not_asked" not in result.report["computed"]
+    assert evaluate(disk, result)["bijective"] == 1
