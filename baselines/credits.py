@@ -50,6 +50,7 @@ CREDITS = {
     "meshlab_triangles": Credit(MESHLAB, ("cignoni2008",)),
     "unwrap": Credit(LIBIGL, ("rabinovich2017", "libigl")),
     "seamster": Credit(LIBIGL, ("sheffer2002", "rabinovich2017", "libigl")),
+    "erickson_har_peled": Credit(LIBIGL, ("erickson2004", "rabinovich2017", "libigl")),
     "automatic+slim": Credit(LIBIGL, ("rabinovich2017", "libigl")),
     "artist+slim": Credit(LIBIGL, ("rabinovich2017", "libigl")),
     "meshed": Credit(MESHLAB, ("kazhdan2013", "bernardini1999", "cignoni2008")),

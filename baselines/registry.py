@@ -53,6 +53,7 @@ METHODS: dict[str, str] = {
     "meshlab_triangles": "baselines.tools.meshlab:MeshLabTriangles",
     "unwrap": "parapoint.unwrapping.unwrap:Unwrap",
     "seamster": "baselines.seamster:Seamster",
+    "erickson_har_peled": "baselines.erickson_har_peled:EricksonHarPeled",
     "automatic+slim": "baselines.hybrid:AutomaticSLIM",
     "artist+slim": "baselines.hybrid:ArtistSLIM",
     "meshed": "baselines.meshed:Meshed",

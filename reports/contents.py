@@ -63,6 +63,7 @@ DISPLAY: dict[str, tuple[str, str]] = {
     "fam": ("FAM", ""),
     "artist+slim": ("Artist's cut + SLIM", ""),
     "seamster": ("Seamster + SLIM", ""),
+    "erickson_har_peled": ("Erickson and Har-Peled + SLIM", "shortest cut"),
     "automatic+slim": ("Automatic cut + SLIM", ""),
     "unwrap": ("Unwrap", "symmetric Dirichlet, one to one"),
     "parapoint+slim": ("Unwrap", "symmetric Dirichlet, one to one"),

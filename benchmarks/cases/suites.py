@@ -215,6 +215,7 @@ SUITES: dict[str, Suite] = {
                 "geometry_image",
                 "automatic+slim",
                 "seamster",
+                "erickson_har_peled",
                 "unwrap(time_budget=60)",
                 "xatlas",
                 "uvatlas",
