@@ -1,4 +1,4 @@
-"""One cell, inside its own process: run a method or measure its map, say how it ended, and end.
+"""One cell, inside its own process: run a method or measure maps, say how it ended, and end.
 
 The process belongs to the method: it may crash, fork, print or leave threads behind. So the outcome
 goes through a pipe that nothing else uses, and the process ends without running any of the method's
@@ -152,10 +152,11 @@ def run(job: RunJob, send: int) -> Outcome:
 
 
 def measure(job: MeasureJob) -> Outcome:
-    """Compute every metric of the map of a job."""
+    """Compute every metric of the maps of a job."""
+    surface = read_surface(job.surface)
     reference = _reference(job.reference) if job.reference else None
-    values = measured(read_surface(job.surface), read_map(job.uv), reference)
-    return Outcome("ok", metrics=values)
+    values = (measured(surface, read_map(path), reference) for path in job.maps)
+    return Outcome("ok", metrics=tuple(values))
 
 
 def _reference(path: Path) -> Parameterization:

@@ -90,10 +90,10 @@ def descendants() -> list[psutil.Process]:
         return []
 
 
-def resident(process: psutil.Process) -> int:
-    """Resident memory of a process in bytes; 0 if it has ended."""
+def resident(process: int) -> int:
+    """Resident memory in bytes of the process of that number; 0 if it has ended."""
     try:
-        return int(process.memory_info().rss)
+        return int(psutil.Process(process).memory_info().rss)
     except psutil.Error:
         return 0
 

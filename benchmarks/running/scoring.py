@@ -1,4 +1,4 @@
-"""The metrics of stored maps, each computed in a process of its own: a wild map may kill it."""
+"""The metrics of stored maps, computed in processes of their own: a wild map may kill one."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ METRICS_TIME_LIMIT = 120.0
 """Wall time in seconds that the metrics of one map may take; 100,000 faces take a few seconds."""
 MEMORY_SHARE = 0.8
 """Fraction of the machine's memory that all cells together may hold, if the user sets no limit."""
+MAPS_TOGETHER = 8
+"""Maps of one surface that one process measures: it reads the surface once for all of them."""
 MAPS_PER_WORKER = 4
 """Maps to measure that justify another supervisor, which takes a second to start."""
 Told = Callable[[int, int], None]
@@ -50,32 +52,45 @@ def scores(
     """
     values: dict[str, dict[str, float]] = {}
     reasons: dict[str, str] = {}
+    alone: list[Task] = []
     jobs = min(workers.width, 1 + len(rows) // MAPS_PER_WORKER)
+
+    def task(some: Sequence[ResultRow]) -> Task:
+        surface = some[0].surface_hash
+        job = MeasureJob(
+            surface=store.scored_path(surface),
+            reference=reference(store, some[0]),
+            maps=tuple(store.uv_path(row.id) for row in some),
+            time_limit=METRICS_TIME_LIMIT * len(some),
+            memory_limit=memory_limit(memory, jobs),
+        )
+        return Task(job, began, functools.partial(ended, some))
 
     def began() -> None:
         told(len(values), len(rows))
 
-    def ended(row: ResultRow, outcome: Outcome, _: Path) -> None:
-        values[row.id] = dict(outcome.metrics)
-        if outcome.status != "ok":
-            reasons[row.id] = outcome.reason
+    def ended(some: Sequence[ResultRow], outcome: Outcome, _: Path) -> None:
+        is_ok = outcome.status == "ok" and len(outcome.metrics) == len(some)
+        if is_ok:
+            for row, found in zip(some, outcome.metrics, strict=True):
+                values[row.id] = dict(found)
+        elif len(some) > 1:  # one of them spoilt it for the others
+            alone.extend(task([row]) for row in some)
+        else:
+            values[some[0].id] = {}
+            reasons[some[0].id] = outcome.reason or "its metrics were lost"
         told(len(values), len(rows))
 
-    tasks = [
-        Task(
-            MeasureJob(
-                surface=store.scored_path(row.surface_hash),
-                reference=reference(store, row),
-                uv=store.uv_path(row.id),
-                time_limit=METRICS_TIME_LIMIT,
-                memory_limit=memory_limit(memory, jobs),
-            ),
-            began,
-            functools.partial(ended, row),
-        )
-        for row in rows
+    surfaces: dict[str, list[ResultRow]] = {}
+    for row in rows:
+        surfaces.setdefault(row.surface_hash, []).append(row)
+    together = [
+        task(of_one[start : start + MAPS_TOGETHER])
+        for of_one in surfaces.values()
+        for start in range(0, len(of_one), MAPS_TOGETHER)
     ]
-    workers.run(tasks, jobs)
+    workers.run(together, jobs)
+    workers.run(alone, jobs)
     return values, reasons
 
 

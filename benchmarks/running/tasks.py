@@ -88,18 +88,23 @@ class RunJob(Job):
 
 @dataclass(frozen=True, kw_only=True)
 class MeasureJob(Job):
-    """Compute every metric of a stored map.
+    """Compute every metric of some stored maps of one surface.
 
     Attributes:
-        uv: the npz file of the map.
+        maps: the npz files of the maps.
     """
 
-    uv: Path
+    maps: tuple[Path, ...]
 
     @property
     def inputs(self) -> dict[str, Path]:
-        """As for every job, and the map."""
-        return super().inputs | {"uv": self.uv}
+        """As for every job, and the maps."""
+        return super().inputs | {f"map{n}": path for n, path in enumerate(self.maps)}
+
+    def reading(self, files: Mapping[str, Path]) -> Self:
+        """As for every job."""
+        maps = tuple(files[f"map{n}"] for n in range(len(self.maps)))
+        return replace(self, surface=files["surface"], reference=files.get("reference"), maps=maps)
 
 
 @dataclass(frozen=True)
@@ -132,7 +137,7 @@ class Outcome(Message):
         peak_memory_mb: peak resident memory of the job's processes, in units of 10^6 bytes.
         uv_sha256: hash of the map; "" where there is none.
         report: what the method wrote beside its result.
-        metrics: the metrics that a MeasureJob computed, by name.
+        metrics: the metrics of each map that a MeasureJob measured, by name.
         printed: the last lines that the method printed.
         host: name and processor of the cluster's worker; "" on the run's own machine.
         took: wall time of the whole job, in seconds.
@@ -151,7 +156,7 @@ class Outcome(Message):
     peak_memory_mb: float | None = None
     uv_sha256: str = ""
     report: Mapping[str, object] = field(default_factory=dict)
-    metrics: Mapping[str, float] = field(default_factory=dict)
+    metrics: tuple[Mapping[str, float], ...] = ()
     printed: str = ""
     host: str = ""
     took: float = 0.0

@@ -33,9 +33,9 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import igl  # noqa: F401  imported before the forks, so that no cell pays for it
-import psutil
 import scipy.sparse.linalg
 import scipy.spatial  # noqa: F401  as above
 
@@ -86,13 +86,14 @@ def main() -> None:
     signal.signal(signal.SIGCHLD, lambda *_: None)  # a handler is what makes the wake-up write
     signal.set_wakeup_fd(waker, warn_on_full_buffer=False)
     registry.names()  # looks through the installed packages, so that no cell has to
+    importlib.import_module("encodings.cp437")  # of names in zip archives, as above
     gc.freeze()  # a collection in a cell copies none of this
     jobs = os.fdopen(os.dup(0), "rb", buffering=0)
     os.write(reply, to_json(Ready()))
     while line := jobs.readline():
         job = from_json(line, RunJob, MeasureJob)
         if isinstance(job, RunJob):
-            _parse(job.spec)
+            _parse(job.spec, job.plugins)
         if isinstance(job, MeasureJob):
             importlib.import_module("benchmarks.metrics.evaluation")  # once, before the forks
         outcome = _supervised(job, wake, [reply, wake, waker, jobs.fileno()])
@@ -100,18 +101,21 @@ def main() -> None:
 
 
 @functools.cache
-def _parse(spec: str) -> None:
-    """Parse the sources of a method, once for all its cells.
+def _parse(spec: str, plugins: tuple[str, ...]) -> None:
+    """Parse a spec and the sources of its method, once for all its cells; import and run nothing.
 
     Each cell hashes the sources of its method (`parapoint.sources`), and needs to parse only those
     that have changed since.
     """
     modules = ["parapoint.surfaces.preparation"]
-    location = registry.METHODS.get(spec.partition("(")[0].strip())
-    if location is not None:
-        modules.append(location.partition(":")[0])
-    with contextlib.suppress(Exception):  # a cell says what is wrong with its sources
+    with contextlib.suppress(Exception):  # a cell says what is wrong with its spec or sources
+        name, _ = registry.parsed(spec)
+        if name in registry.METHODS:
+            modules.append(registry.METHODS[name].partition(":")[0])
         sources.sources(*modules)
+        for plugin in plugins:
+            path, _, _ = plugin.rpartition(":")
+            sources.imported(Path(path).read_text(encoding="utf-8"), "")
 
 
 def _supervised(job: Job, wake: int, private: list[int]) -> Outcome:
@@ -124,6 +128,7 @@ def _supervised(job: Job, wake: int, private: list[int]) -> Outcome:
     """
     kills = system_kills()
     deadline = time.monotonic() + job.time_limit
+    next_look = time.monotonic() + POLL
     next_tree = time.monotonic() + TREE_POLL
     result, send = os.pipe()
     child = _start(job, send, [*private, result])
@@ -150,11 +155,13 @@ def _supervised(job: Job, wake: int, private: list[int]) -> Outcome:
             break
         now = time.monotonic()
         if now >= next_tree:
-            others = sum(resident(process) for process in descendants() if process.pid != child)
+            others = sum(resident(process.pid) for process in descendants() if process.pid != child)
             next_tree = now + TREE_POLL
-        memory = resident(psutil.Process(child)) + others
-        peak = max(peak, memory)
-        verdict = verdict or _beyond(job, memory, now > deadline)
+        if now >= next_look:
+            memory = resident(child) + others
+            peak = max(peak, memory)
+            verdict = verdict or _beyond(job, memory, now > deadline)
+            next_look = now + POLL
         if len(message) > LONGEST_SAID:
             message.clear()
             verdict = verdict or Outcome("failed", "wrote into the pipe of its outcome")

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from parapoint.errors import InputError
-from parapoint.files.decoding import check_archive
+from parapoint.files.decoding import opened_archive
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization, TracePoint
 from parapoint.surfaces.surface import Mesh, PointCloud, Surface
 
@@ -133,11 +133,8 @@ def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
     if path.exists() and not path.is_file():
         raise InputError(f"{path}: damaged (no file, but a folder, a pipe or a device)")
     try:
-        # We open the file ourselves, since numpy leaves one open that is not an archive.
-        with path.open("rb") as stream:
-            check_archive(stream)
-            with np.load(stream, allow_pickle=False) as archive:
-                arrays = {name: archive[name] for name in archive.files}
+        with path.open("rb") as stream, opened_archive(stream) as archive:
+            arrays = {name: archive[name] for name in archive.files}
     except FileNotFoundError:
         raise InputError(f"{path}: missing") from None
     except InputError as error:

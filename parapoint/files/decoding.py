@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import os
 import typing
-import zipfile
 from contextvars import ContextVar
+
+from numpy.lib.npyio import NpzFile
 
 from parapoint.errors import InputError
 
@@ -83,14 +84,15 @@ def check_decoded(size: int, file_size: int) -> None:
         )
 
 
-def check_archive(stream: typing.IO[bytes]) -> None:
-    """Check an npz file as `check_decoded` does; the stream is left at its start.
+def opened_archive(stream: typing.IO[bytes]) -> NpzFile:
+    """The npz file in a stream, checked as `check_decoded` does before any array is read.
 
     Raises:
         InputError: the arrays are larger than is allowed.
         zipfile.BadZipFile: the stream is no archive.
     """
     file_size = stream.seek(0, os.SEEK_END)
-    with zipfile.ZipFile(stream) as archive:
-        check_decoded(sum(item.file_size for item in archive.infolist()), file_size)
-    stream.seek(0)
+    archive = NpzFile(stream, allow_pickle=False)
+    assert archive.zip is not None  # it is until the file is closed
+    check_decoded(sum(item.file_size for item in archive.zip.infolist()), file_size)
+    return archive

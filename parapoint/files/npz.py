@@ -8,15 +8,14 @@ import numpy as np
 
 from parapoint.errors import InputError
 from parapoint.files.content import Content, points_content
-from parapoint.files.decoding import check_archive
+from parapoint.files.decoding import opened_archive
 
 
 def npz(data: bytes) -> Content:
     """Arrays points, normals and whatever else is known; or vertices, faces, uv and corners."""
     if not data:
         raise InputError("is empty")
-    check_archive(io.BytesIO(data))
-    with np.load(io.BytesIO(data), allow_pickle=False) as file:
+    with opened_archive(io.BytesIO(data)) as file:
         arrays = {name: np.asarray(file[name]) for name in file.files}
     if "vertices" in arrays and "faces" in arrays:
         faces = _whole(arrays, "faces")

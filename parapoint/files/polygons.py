@@ -16,9 +16,9 @@ THIN = 1e-9
 """Share of a polygon's area below which a triangle of its fan counts as folded or flat."""
 MOST_CORNERS = 20_000
 """Corners that a polygon may have where no fan fills it: cutting it takes time by their square."""
-FEW_CORNERS = 64
+FEW_CORNERS = 32
 """Corners up to which a polygon is cut in no time, whatever its shape."""
-MOST_STEPS = 4e9
+MOST_STEPS = 3e9
 """Steps, the cube of the corners each, that polygons may take which touch or cross themselves; the
 bridge to a hole touches."""
 

@@ -189,7 +189,7 @@ def hands(tmp_path, monkeypatch):
 def task(
     outcomes: list[Outcome], modules: tuple[str, ...] = (), interpreter: str = sys.executable
 ) -> Task:
-    job = MeasureJob(surface=Path("s"), uv=Path("u"), time_limit=9.0, memory_limit=1e9)
+    job = MeasureJob(surface=Path("s"), maps=(Path("u"),), time_limit=9.0, memory_limit=1e9)
     return Task(
         job, lambda: None, lambda outcome, _: outcomes.append(outcome), modules, interpreter
     )

@@ -33,7 +33,7 @@ MEASURE = MeasureJob(
     reference=Path("r.npz"),
     time_limit=1.0,
     memory_limit=1.0,
-    uv=Path("u.npz"),
+    maps=(Path("u.npz"), Path("v.npz")),
 )
 OUTCOME = Outcome(
     "failed",
@@ -43,7 +43,7 @@ OUTCOME = Outcome(
     seconds=0.1,
     peak_memory_mb=3.0,
     report={"energy": [1, "inf", None]},
-    metrics={"a": math.inf, "b": 0.1 + 0.2, "c": -0.0},
+    metrics=({"a": math.inf, "b": 0.1 + 0.2, "c": -0.0}, {}),
 )
 
 
@@ -57,11 +57,11 @@ def test_a_message_comes_back_as_it_was_sent(message):
 
 def test_the_files_that_a_job_reads_can_lie_elsewhere():
     assert RUN.inputs == {"surface": Path("a b.npz")}
-    assert MEASURE.inputs == {
-        name: Path(f"{name[0]}.npz") for name in ("surface", "reference", "uv")
-    }
-    moved = MEASURE.reading({"uv": Path("/there/u.npz")})
-    assert moved.inputs == MEASURE.inputs | {"uv": Path("/there/u.npz")}
+    names = {"surface": "s.npz", "reference": "r.npz", "map0": "u.npz", "map1": "v.npz"}
+    assert MEASURE.inputs == {name: Path(file) for name, file in names.items()}
+    moved = {name: Path("/there") / file for name, file in names.items()}
+    assert MEASURE.reading(moved).inputs == moved
+    assert MEASURE.reading(moved).reading(MEASURE.inputs) == MEASURE
     assert (RUN.map, RUN.work) == (Path("cells/1/map.npz"), Path("cells/1/work"))
 
 
@@ -86,7 +86,7 @@ def test_only_the_messages_that_are_expected_are_read():
         ({"took": "inf"}, "Outcome.took"),
         ({"took": None}, "Outcome.took"),
         ({"report": []}, "Outcome.report"),
-        ({"metrics": {"a": "many"}}, "Outcome.metrics"),
+        ({"metrics": [{"a": "many"}]}, "Outcome.metrics"),
         ({"host": {}}, "Outcome.host"),
         ({"status_": "ok"}, "has no field 'status_'"),
     ],

@@ -241,11 +241,22 @@ def test_a_cell_whose_method_has_changed_is_told_so(tmp_path):
 @pytest.mark.parametrize("spec", ["tutte", "slim(iterations=5)"])
 def test_a_supervisor_parses_the_sources_of_a_method_for_all_its_cells(spec):
     sources.imported.cache_clear()
-    worker._parse.__wrapped__(spec)
+    worker._parse.__wrapped__(spec, ())
     parsed = sources.imported.cache_info().misses
     registry.source_hash(registry.method(spec)[1])
     assert sources.imported.cache_info().misses == parsed > 0
 
 
-def test_a_method_that_is_not_built_in_is_parsed_in_its_cells():
-    worker._parse.__wrapped__("mine(step=1)")
+def test_a_supervisor_parses_a_plugin_and_does_not_run_it(tmp_path):
+    file = tmp_path / "plugin.py"
+    file.write_text("import json\nraise SystemExit('a supervisor runs no plugin')\n")
+    sources.imported.cache_clear()
+    worker._parse.__wrapped__("mine(step=1)", (f"{file}:Mine",))
+    parsed = sources.imported.cache_info().misses
+    assert sources.imported(file.read_text(), "") == ("json",)
+    assert sources.imported.cache_info().misses == parsed
+
+
+@pytest.mark.parametrize("spec", ["mine(step=1)", "no spec (", "tutte"])
+def test_a_supervisor_leaves_faults_of_a_spec_or_a_plugin_to_the_cell(spec):
+    worker._parse.__wrapped__(spec, ("missing.py:Mine",))

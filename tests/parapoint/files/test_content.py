@@ -11,7 +11,7 @@ from parapoint.errors import InputError
 from parapoint.files import decoding
 from parapoint.files.attributes import colours_of, unit_colours
 from parapoint.files.content import numbers, strip_triangles, word_counts
-from parapoint.files.decoding import check_archive, check_decoded
+from parapoint.files.decoding import check_decoded, opened_archive
 
 
 @pytest.mark.parametrize(
@@ -106,11 +106,23 @@ def test_what_a_file_decodes_to_is_bounded_by_what_is_allowed_and_by_its_size():
         check_decoded(3 * 10**12 + 1, 10)
 
 
-def test_an_archive_is_checked_and_left_at_its_start():
+def test_an_archive_is_read_from_its_start_wherever_the_stream_stands():
     stream = io.BytesIO()
-    with zipfile.ZipFile(stream, "w") as archive:
-        archive.writestr("a", b"0" * 1000)
-        archive.writestr("b", b"0" * 24)
-    stream.seek(7)
-    check_archive(stream)
-    assert stream.tell() == 0
+    np.savez(stream, a=np.arange(3), b=np.zeros(0))
+    with opened_archive(stream) as archive:
+        assert {name: archive[name].tolist() for name in archive.files} == {"a": [0, 1, 2], "b": []}
+
+
+def test_an_archive_that_decodes_to_too_much_is_refused_before_an_array_is_read():
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("a.npy", b"0" * (decoding.DECODED_LEAST // 2))
+        archive.writestr("b.npy", b"0" * (decoding.DECODED_LEAST // 2 + 1))
+    with pytest.raises(InputError, match=f"decode to {decoding.DECODED_LEAST + 1:,}"):
+        opened_archive(stream)
+
+
+def test_what_is_no_archive_is_not_opened():
+    for content in (b"", b"\x93NUMPY\x01\x00", b"\x80\x04N.", b"PK\x03\x04"):
+        with pytest.raises(zipfile.BadZipFile):
+            opened_archive(io.BytesIO(content))
