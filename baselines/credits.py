@@ -51,6 +51,7 @@ CREDITS = {
     "unwrap": Credit(LIBIGL, ("rabinovich2017", "libigl")),
     "seamster": Credit(LIBIGL, ("sheffer2002", "rabinovich2017", "libigl")),
     "erickson_har_peled": Credit(LIBIGL, ("erickson2004", "rabinovich2017", "libigl")),
+    "da_wand": Credit(LIBIGL, ("liu2023", "levy2002", "liu2008", "libigl")),
     "automatic+slim": Credit(LIBIGL, ("rabinovich2017", "libigl")),
     "artist+slim": Credit(LIBIGL, ("rabinovich2017", "libigl")),
     "meshed": Credit(MESHLAB, ("kazhdan2013", "bernardini1999", "cignoni2008")),
@@ -65,6 +66,7 @@ CREDITS = {
     "foldingnet": Credit(OURS, ("yang2018",)),
     "atlasnet": Credit(OURS, ("groueix2018",)),
     "nuvo": Credit(OURS, ("srinivasan2023",)),
+    "nsm": Credit(LIBIGL, ("morreale2021", "rabinovich2017", "libigl")),
 }
 """By registry name. A plugin says its own as class attributes, `licence` and `citation`."""
 

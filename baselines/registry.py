@@ -54,6 +54,7 @@ METHODS: dict[str, str] = {
     "unwrap": "parapoint.unwrapping.unwrap:Unwrap",
     "seamster": "baselines.seamster:Seamster",
     "erickson_har_peled": "baselines.erickson_har_peled:EricksonHarPeled",
+    "da_wand": "baselines.da_wand:DAWand",
     "automatic+slim": "baselines.hybrid:AutomaticSLIM",
     "artist+slim": "baselines.hybrid:ArtistSLIM",
     "meshed": "baselines.meshed:Meshed",
@@ -65,6 +66,7 @@ METHODS: dict[str, str] = {
     "foldingnet": "baselines.neural.foldingnet:FoldingNet",
     "atlasnet": "baselines.neural.atlasnet:AtlasNet",
     "nuvo": "baselines.neural.nuvo:Nuvo",
+    "nsm": "baselines.neural.nsm:NSM",
 }
 """Name -> "module:Class" of each method that comes with the benchmark."""
 

@@ -219,7 +219,9 @@ def _check_run(
         shape = (len(surface.points), 2)
         found = result.uv.shape
         _promise(found == shape, f"{where}: uv has shape {found}, not {shape}")
-    spread = np.linalg.svd(result.uv - result.uv.mean(axis=0), compute_uv=False)
+    known = result.uv[np.isfinite(result.uv).all(axis=1)]
+    _promise(len(known) > 0, f"{where}: the map leaves everything out")
+    spread = np.linalg.svd(known - known.mean(axis=0), compute_uv=False)
     wide = bool(spread[1] > THINNEST * spread[0])
     _promise(wide, f"{where}: the map collapsed to a line or a point")
     _check_trace(result, seconds, where)
@@ -279,7 +281,7 @@ def _check_repeat(
 ) -> None:
     """The same seed gives the same map."""
     second = method.parameterize(surface, seed=SEED)
-    same = np.array_equal(first.uv, second.uv)
+    same = np.array_equal(first.uv, second.uv, equal_nan=True)
     if isinstance(first, Parameterization) and isinstance(second, Parameterization):
         same = same and np.array_equal(first.corners, second.corners)
     _promise(same, f"{where}: another map under the same seed")
@@ -344,7 +346,8 @@ def measures(surface: Surface, result: Parameterization | PointParameterization)
 
     The sums of absolute differences between the shares that edges, and faces, have of the whole on
     the surface and in the plane: 0 where all shares stay, 2 at most but for flipped faces. The
-    edges of a cloud lead to its six nearest neighbours; it has no faces.
+    edges of a cloud lead to its six nearest neighbours; it has no faces. Faces that the map leaves
+    out do not count.
     """
     if isinstance(result, PointParameterization):
         assert isinstance(surface, PointCloud)
@@ -354,12 +357,15 @@ def measures(surface: Surface, result: Parameterization | PointParameterization)
         ]
         return np.array([_share_difference(*lengths), 0.0])
     assert isinstance(surface, Mesh)
-    corners = surface.vertices[surface.faces], result.uv[result.corners]
+    known = result.covered
+    corners = surface.vertices[surface.faces[known]], result.uv[result.corners[known]]
     lengths = [np.linalg.norm(of - np.roll(of, 1, axis=1), axis=2) for of in corners]
     (ax, ay), (bx, by) = ((corners[1][:, k] - corners[1][:, 0]).T for k in (1, 2))
     turned = ax * by - ay * bx
     turned *= np.sign(turned.sum()) or 1.0
-    return np.array([_share_difference(*lengths), _share_difference(surface.face_areas, turned)])
+    return np.array(
+        [_share_difference(*lengths), _share_difference(surface.face_areas[known], turned)]
+    )
 
 
 def _share_difference(one: FloatArray, other: FloatArray) -> float:

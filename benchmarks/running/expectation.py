@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
 from benchmarks.cases import models
+from benchmarks.cases.derived import undrawn
 from benchmarks.cases.suites import Suite
 from parapoint.errors import InputError
 
@@ -32,7 +33,7 @@ SECONDS_PER_10000_FACES: dict[str, float] = {
 guess. It grows faster than the faces for some; a budget bounds it."""
 OTHERS = 3.0
 """The same of a method that is not listed."""
-WHOLE_BUDGET = frozenset({"parapoint", "fam", "nuvo", "foldingnet", "atlasnet"})
+WHOLE_BUDGET = frozenset({"parapoint", "fam", "nuvo", "foldingnet", "atlasnet", "nsm"})
 """Methods that use all of their time budget, which is in seconds."""
 SECONDS_PER_ITERATION = 0.075
 """Processor time of an iteration of ParaPoint's training at 2,048 points, in seconds."""
@@ -45,7 +46,7 @@ USUAL_FACES = 10_000
 def faces(case: str) -> int:
     """Number of faces of a case, or of points; USUAL_FACES where only its file can tell."""
     try:
-        model = models.info(case)
+        model = models.info(undrawn(case))
     except InputError:
         return USUAL_FACES
     return (model.faces or model.vertices) if model else USUAL_FACES

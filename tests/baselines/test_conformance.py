@@ -26,6 +26,7 @@ ARGUMENTS = {
     "fam": {"points": 120, "subset": 100, "iterations": 2},
     "foldingnet": {"points": 120, "subset": 100, "iterations": 2},
     "atlasnet": {"points": 120, "subset": 100, "iterations": 2, "charts": 3},
+    "nsm": {"points": 120, "subset": 100, "iterations": 4},
     "nuvo": {"points": 120, "subset": 100, "iterations": 2},
     "geometry_image": {"side": 17},
     "smith_schaefer": {"iterations": 60},

@@ -1,0 +1,139 @@
+"""Neural Surface Maps: a flattened mesh as a network, refined between its vertices."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from baselines.neural.method import NeuralMethod
+from parapoint.method import UnsupportedError
+from parapoint.planar.descent import Run, sound
+from parapoint.planar.growth import PRICE, Need, grown
+from parapoint.surfaces.parameterization import Parameterization, TracePoint
+from parapoint.surfaces.surface import Mesh, Surface
+
+FLATTENING_SHARE = 0.5
+"""Share of a time budget that the map to be fitted takes at most, in seconds on the wall."""
+REFINEMENT_SHARE = 0.15
+"""Share of the steps, and of what is left of the time budget, that the refinement takes."""
+EXTENT = 8.0
+"""Longest side of the flattened mesh as the networks see it; with 2 they learn slower."""
+CHECKED = 4_000
+"""Fresh places at which the report measures the networks."""
+
+
+@dataclass(frozen=True)
+class NSM(NeuralMethod):
+    """A network overfitted to an isometric map of the mesh, and a second one that refines the map.
+
+    L. Morreale, N. Aigerman, V. G. Kim and N. J. Mitra 2021, "Neural Surface Maps". The mesh is cut
+    and flattened as by `automatic+slim`. A residual network f from the plane to space is fitted to
+    dense samples of the triangles, positions and normals (surface map, section 3). A network h from
+    the plane to itself, at first the identity, lowers the symmetric Dirichlet energy of f ∘ h⁻¹,
+    tr M + tr (M + ε)⁻¹ of its first fundamental form, over places anywhere on the surface; the
+    boundary is free, flips of h are penalised (parameterization, section 4). A vertex lies at h of
+    its place in the flattened mesh.
+
+    Ours: a smaller network, squareplus in place of softplus, SOAP in place of RMSProp. Left out:
+    maps between two surfaces, and collections of them.
+
+    Attributes:
+        points: samples of the triangles.
+        iterations: steps of both trainings together.
+        subset: samples of a step.
+        time_budget: seconds of processor time, the flattening among them.
+    """
+
+    points: int = 100_000
+    iterations: int = 10_000
+    subset: int = 256
+
+    requires: ClassVar[frozenset[str]] = frozenset({"faces", "disk_after_cut"})
+    packages: ClassVar[tuple[str, ...]] = ("torch", "libigl", "shapely")
+
+    @property
+    def deterministic(self) -> bool:
+        """Whether the same seed gives the same map: not where time ends the run."""
+        return self.time_budget is None
+
+    def parameterize(self, surface: Surface, *, seed: int) -> Parameterization:
+        """The map at the vertices, in the unit of the surface.
+
+        Raises:
+            UnsupportedError: the surface is a cloud.
+            InputError: a triangle has no area.
+            FlatteningError: Tutte's embedding has flips.
+        """
+        import torch
+
+        from baselines.neural import nsm_networks as of
+
+        if not isinstance(surface, Mesh):
+            raise UnsupportedError("needs faces; the surface is a point cloud")
+        began, processor = time.perf_counter(), time.process_time()
+        flat = flattened(surface, self.time_budget)
+        corners, uv = flat.mesh.faces, flat.uv
+        unit = float(np.ptp(uv, axis=0).max()) / EXTENT
+        inside = (uv - (uv.min(axis=0) + uv.max(axis=0)) / 2) / unit
+        solid = (flat.mesh.vertices - flat.mesh.vertices.mean(axis=0)) / unit
+        triangles = of.Triangles(*(torch.as_tensor(at[corners]) for at in (inside, solid)))
+        generator = torch.Generator().manual_seed(seed)
+        fitted, refined = of.SurfaceMap(generator), of.Refinement(generator)
+        samples = triangles.drawn(self.points, generator)
+
+        def chosen() -> torch.Tensor:
+            return torch.randint(self.points, (self.subset,), generator=generator)
+
+        trace: list[TracePoint] = []
+
+        def train(network: torch.nn.Module, terms: of.Terms, rate: float, end: float) -> None:
+            steps = round(end * self.iterations) - len(trace)
+            left = None
+            if self.time_budget is not None:
+                spent = time.process_time() - processor
+                left = (self.time_budget - spent) * (end if network is fitted else 1.0)
+            for losses in of.trained(network, terms, rate, steps, left):
+                trace.append(TracePoint(len(trace) + 1, time.perf_counter() - began, losses))
+
+        at_fit, at_refinement = of.RATES
+        first = 1 - REFINEMENT_SHARE
+        train(fitted, lambda: of.overfit_terms(fitted, samples.rows(chosen())), at_fit, first)
+        steps_of_fit = len(trace)
+        forms = of.first_forms(fitted, samples.uv)
+
+        def distortion() -> dict[str, torch.Tensor]:
+            rows = chosen()
+            return of.distortion_terms(refined, samples.uv[rows], forms[rows])
+
+        train(refined, distortion, at_refinement, 1.0)
+        with torch.no_grad():
+            moved = refined(torch.as_tensor(inside, dtype=torch.float32)[None])[0]
+            checked = of.figures(fitted, refined, triangles.drawn(CHECKED, generator))
+        extent = float(np.ptp(solid, axis=0).max())
+        report: dict[str, object] = {
+            "points": self.points,
+            "points_of_a_step": self.subset,
+            "iterations": [steps_of_fit, len(trace) - steps_of_fit],
+            "losses": dict(trace[-1].values) if trace else {},
+            "flattening": flat.report(),
+            "rms_of_fit": checked.pop("distance") / extent,
+            **checked,
+        }
+        return Parameterization(
+            unit * moved.numpy().astype(np.float64), corners, tuple(trace), report
+        )
+
+
+def flattened(mesh: Mesh, time_budget: float | None) -> Run:
+    """The isometric map of `automatic+slim`, in its part of the time."""
+    run = Run(sound(mesh))
+    if time_budget is not None:
+        run.deadline = time.monotonic() + FLATTENING_SHARE * time_budget
+    run.begin()
+    run.improve()
+    run = grown(run, Need(PRICE))
+    run.improve()
+    return run
