@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from baselines.neural.method import NeuralMethod
+from parapoint import clock
 from parapoint.method import UnsupportedError
 from parapoint.planar.descent import Run, sound
 from parapoint.planar.growth import PRICE, Need, grown
@@ -16,7 +16,7 @@ from parapoint.surfaces.parameterization import Parameterization, TracePoint
 from parapoint.surfaces.surface import Mesh, Surface
 
 FLATTENING_SHARE = 0.5
-"""Share of a time budget that the map to be fitted takes at most, in seconds on the wall."""
+"""Share of a time budget that the map to be fitted takes at most."""
 REFINEMENT_SHARE = 0.15
 """Share of the steps, and of what is left of the time budget, that the refinement takes."""
 EXTENT = 8.0
@@ -73,7 +73,7 @@ class NSM(NeuralMethod):
 
         if not isinstance(surface, Mesh):
             raise UnsupportedError("needs faces; the surface is a point cloud")
-        began, processor = time.perf_counter(), time.process_time()
+        began = clock.worked()
         flat = flattened(surface, self.time_budget)
         corners, uv = flat.mesh.faces, flat.uv
         unit = float(np.ptp(uv, axis=0).max()) / EXTENT
@@ -93,10 +93,10 @@ class NSM(NeuralMethod):
             steps = round(end * self.iterations) - len(trace)
             left = None
             if self.time_budget is not None:
-                spent = time.process_time() - processor
+                spent = clock.worked() - began
                 left = (self.time_budget - spent) * (end if network is fitted else 1.0)
             for losses in of.trained(network, terms, rate, steps, left):
-                trace.append(TracePoint(len(trace) + 1, time.perf_counter() - began, losses))
+                trace.append(TracePoint(len(trace) + 1, clock.worked() - began, losses))
 
         at_fit, at_refinement = of.RATES
         first = 1 - REFINEMENT_SHARE
@@ -131,7 +131,7 @@ def flattened(mesh: Mesh, time_budget: float | None) -> Run:
     """The isometric map of `automatic+slim`, in its part of the time."""
     run = Run(sound(mesh))
     if time_budget is not None:
-        run.deadline = time.monotonic() + FLATTENING_SHARE * time_budget
+        run.deadline = clock.worked() + FLATTENING_SHARE * time_budget
     run.begin()
     run.improve()
     run = grown(run, Need(PRICE))
