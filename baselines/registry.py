@@ -65,6 +65,8 @@ METHODS: dict[str, str] = {
     "fam": "baselines.neural.fam:FAM",
     "foldingnet": "baselines.neural.foldingnet:FoldingNet",
     "atlasnet": "baselines.neural.atlasnet:AtlasNet",
+    "flattening_net": "baselines.neural.flattening_net:FlatteningNet",
+    "reggeonet": "baselines.neural.reggeonet:RegGeoNet",
     "nuvo": "baselines.neural.nuvo:Nuvo",
     "nsm": "baselines.neural.nsm:NSM",
 }

@@ -60,6 +60,8 @@ DISPLAY: dict[str, tuple[str, str]] = {
     "textured": ("Textured", ""),
     "foldingnet": ("FoldingNet", ""),
     "atlasnet": ("AtlasNet", ""),
+    "flattening_net": ("Flattening-Net", ""),
+    "reggeonet": ("RegGeoNet", ""),
     "nsm": ("Neural Surface Maps", ""),
     "fam": ("FAM", ""),
     "artist+slim": ("Artist's cut + SLIM", ""),

@@ -237,6 +237,8 @@ SUITES: dict[str, Suite] = {
                 "parapoint(preset=learned, time_budget=60)",
                 "foldingnet(time_budget=60)",
                 "atlasnet(time_budget=60)",
+                "flattening_net(time_budget=60)",
+                "reggeonet(time_budget=60)",
                 "nsm(time_budget=60)",
                 "fam(points=4096, subset=256, time_budget=60)",
                 "nuvo(points=4096, subset=256, time_budget=60)",

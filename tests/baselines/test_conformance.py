@@ -27,6 +27,8 @@ ARGUMENTS = {
     "foldingnet": {"points": 120, "subset": 100, "iterations": 2},
     "atlasnet": {"points": 120, "subset": 100, "iterations": 2, "charts": 3},
     "nsm": {"points": 120, "subset": 100, "iterations": 4},
+    "flattening_net": {"points": 120, "subset": 100, "iterations": 2},
+    "reggeonet": {"points": 120, "subset": 100, "iterations": 2},
     "nuvo": {"points": 120, "subset": 100, "iterations": 2},
     "geometry_image": {"side": 17},
     "smith_schaefer": {"iterations": 60},
