@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from parapoint.planar.descent import Run, sound
 from parapoint.planar.growth import PRICE, Need, grown
 from parapoint.surfaces.parameterization import Parameterization, TracePoint
 from parapoint.surfaces.surface import Mesh, Surface
+
+if TYPE_CHECKING:
+    from baselines.neural.stepping import Terms
 
 FLATTENING_SHARE = 0.5
 """Share of a time budget that the map to be fitted takes at most, in seconds on the wall."""
@@ -70,6 +73,7 @@ class NSM(NeuralMethod):
         import torch
 
         from baselines.neural import nsm_networks as of
+        from baselines.neural.stepping import trained
 
         if not isinstance(surface, Mesh):
             raise UnsupportedError("needs faces; the surface is a point cloud")
@@ -89,13 +93,13 @@ class NSM(NeuralMethod):
 
         trace: list[TracePoint] = []
 
-        def train(network: torch.nn.Module, terms: of.Terms, rate: float, end: float) -> None:
+        def train(network: torch.nn.Module, terms: Terms, rate: float, end: float) -> None:
             steps = round(end * self.iterations) - len(trace)
             left = None
             if self.time_budget is not None:
                 spent = time.process_time() - processor
                 left = (self.time_budget - spent) * (end if network is fitted else 1.0)
-            for losses in of.trained(network, terms, rate, steps, left):
+            for losses in trained(network, terms, rate, steps, left):
                 trace.append(TracePoint(len(trace) + 1, time.perf_counter() - began, losses))
 
         at_fit, at_refinement = of.RATES

@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-import math
-import time
-from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
 
 from parapoint.learned.networks import ACTIVATIONS, Stack
-from parapoint.learned.optimizers import SOAP
-
-Terms = Callable[[], dict[str, Tensor]]
-"""Gives the weighted terms of a loss at a batch."""
 
 WIDTH, BLOCKS = 128, 4
 """Channels and residual blocks of the surface map."""
@@ -190,30 +183,3 @@ def figures(surface: SurfaceMap, refinement: Refinement, at: Samples) -> dict[st
         "distortion_after": after["distortion"].item(),
         "flipped": turned.float().mean().item(),
     }
-
-
-def trained(
-    network: nn.Module,
-    terms: Terms,
-    rate: float,
-    iterations: int,
-    processor_seconds: float | None,
-) -> Iterator[dict[str, float]]:
-    """Train a network on the sum of the terms until the steps or the processor's time end.
-
-    Yields:
-        The terms and their "total", at each step.
-    """
-    began, limit = time.process_time(), math.inf
-    if processor_seconds is not None:
-        limit = max(processor_seconds, 1e-9)
-    optimizer = SOAP(list(network.parameters()))
-    for step in range(iterations):
-        progress = max(step / iterations, (time.process_time() - began) / limit)
-        if progress >= 1:
-            return
-        found = terms()
-        total = torch.stack(list(found.values())).sum()
-        total.backward()  # type: ignore[no-untyped-call]
-        optimizer.step(rate * (1 + math.cos(math.pi * progress)) / 2)
-        yield {name: term.item() for name, term in found.items()} | {"total": total.item()}

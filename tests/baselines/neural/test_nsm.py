@@ -13,9 +13,9 @@ from baselines.neural.nsm_networks import (
     distortion_terms,
     first_forms,
     overfit_terms,
-    trained,
     with_axes,
 )
+from baselines.neural.stepping import trained
 from parapoint.errors import InputError
 from parapoint.surfaces.surface import PointCloud
 from parapoint.testing import irregular_disk
