@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
 from benchmarks.cases import models
+from benchmarks.cases.derived import undrawn
 from benchmarks.cases.suites import Suite
 from parapoint.errors import InputError
 
@@ -45,7 +46,7 @@ USUAL_FACES = 10_000
 def faces(case: str) -> int:
     """Number of faces of a case, or of points; USUAL_FACES where only its file can tell."""
     try:
-        model = models.info(case)
+        model = models.info(undrawn(case))
     except InputError:
         return USUAL_FACES
     return (model.faces or model.vertices) if model else USUAL_FACES

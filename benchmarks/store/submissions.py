@@ -16,6 +16,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from benchmarks.cases import models
+from benchmarks.cases.derived import is_drawn
 from benchmarks.cases.suites import Suite
 from benchmarks.store.archives import arrays_hash, disk_said, map_arrays, write_arrays
 from benchmarks.store.results import Store
@@ -103,7 +104,8 @@ def read(folder: Path, method: str, suite: Suite) -> Submission:
     clouds: list[str] = []
     for case in suite.cases:
         if case not in files:
-            (clouds if "@" in case else missing).append(case)
+            is_cloud = "@" in case and not is_drawn(case)
+            (clouds if is_cloud else missing).append(case)
             continue
         try:
             maps.append(_fitting(case, files[case]))
