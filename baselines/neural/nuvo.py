@@ -15,6 +15,17 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
+class SingleChart(NeuralMethod):
+    """Nuvo with a single chart."""
+
+    def trainer(self) -> type[SurfaceTrainer]:
+        """See `NeuralMethod`."""
+        from baselines.neural.nuvo_training import NuvoTrainer
+
+        return NuvoTrainer
+
+
+@dataclass(frozen=True)
 class Nuvo(NeuralMethod):
     """A neural map to unit squares in the manner of Nuvo, with a single chart or with several.
 
@@ -39,18 +50,13 @@ class Nuvo(NeuralMethod):
         super().__post_init__()
         check_whole("charts", self.charts, 1, 16)
 
-    def trainer(self) -> type[SurfaceTrainer]:
-        """See `NeuralMethod`."""
-        from baselines.neural.nuvo_training import NuvoTrainer
-
-        return NuvoTrainer
-
     def parameterize(
         self, surface: Surface, *, seed: int
     ) -> Parameterization | PointParameterization:
         """See `NeuralMethod`."""
         if self.charts == 1:
-            return super().parameterize(surface, seed=seed)
+            single = SingleChart(self.points, self.iterations, self.subset, self.time_budget)
+            return single.parameterize(surface, seed=seed)
         from baselines.neural.nuvo_charts import charted
 
         return charted(self, surface, seed)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterator
 
 import torch
 from torch import Tensor, nn
 
+from parapoint import clock
 from parapoint.learned.optimizers import SOAP
 
 Terms = Callable[[], dict[str, Tensor]]
@@ -20,19 +20,19 @@ def trained(
     terms: Terms,
     rate: float,
     iterations: int,
-    processor_seconds: float | None,
+    seconds: float | None,
 ) -> Iterator[dict[str, float]]:
-    """Train a network on the sum of the terms until the steps or the processor's time end.
+    """Train a network on the sum of the terms until the steps or the seconds of work end.
 
     Yields:
         The terms and their "total", at each step.
     """
-    began, limit = time.process_time(), math.inf
-    if processor_seconds is not None:
-        limit = max(processor_seconds, 1e-9)
+    began, limit = clock.worked(), math.inf
+    if seconds is not None:
+        limit = max(seconds, 1e-9)
     optimizer = SOAP(list(network.parameters()))
     for step in range(iterations):
-        progress = max(step / iterations, (time.process_time() - began) / limit)
+        progress = max(step / iterations, (clock.worked() - began) / limit)
         if progress >= 1:
             return
         found = terms()
