@@ -62,7 +62,7 @@ class Estimator(ABC):
     Attributes:
         components: see `parapoint.surfaces.components.COMPONENTS`.
         seed: of every random draw.
-        time_budget: seconds that a fit may take, or None.
+        time_budget: seconds of work (`parapoint.clock`) that a fit may take, or None.
         points_: (n, 3) the points that the map was fitted to.
         frame_: where they lie as the map sees them.
         map_: the map in that frame; `transform` and `inverse_transform` use it.

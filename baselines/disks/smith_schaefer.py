@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ import numpy as np
 
 from baselines.disks.barrier_energy import Energy
 from baselines.disks.quasi_newton import MEMORY, direction
+from parapoint import clock
 from parapoint.parameters import LONGEST_SECONDS, check_number
 from parapoint.planar.crossing import crossing_vertices
 from parapoint.planar.domains import (
@@ -84,7 +84,7 @@ class SmithSchaefer:
             InputError: a triangle has no area.
             FlatteningError: Tutte's embedding has flips.
         """
-        began = time.perf_counter()
+        began = clock.worked()
         disk = domain(surface)
         check_triangles(disk.vertices, disk.faces)
         unit = math.sqrt(disk.area)
@@ -99,9 +99,9 @@ class SmithSchaefer:
         for done, (moved, distortion) in enumerate(descent(energy, uv, self.iterations)):
             uv = moved
             kept = unit * uv if is_kept(done, self.iterations) else None
-            seconds = time.perf_counter() - began
+            seconds = clock.worked() - began
             trace.append(TracePoint(done, seconds, {"symmetric_dirichlet": distortion}, kept))
-            if time.perf_counter() > deadline:
+            if clock.worked() > deadline:
                 break
         report: dict[str, object] = {
             "energy": "symmetric_dirichlet",

@@ -9,13 +9,13 @@ lies in the chart of most of its corners; vertices at the border of charts have 
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
+from parapoint import clock
 from parapoint.learned.losses import EPSILON, nearest
 from parapoint.surfaces.parameterization import TracePoint
 from parapoint.surfaces.preparation import shelves
@@ -57,10 +57,10 @@ def fitted(
     time_budget: float | None,
 ) -> Iterator[TracePoint]:
     """Train networks on the sum of the terms, a step at a time, until the steps or the time end."""
-    began = time.perf_counter()
+    began = clock.worked()
     optimizer = torch.optim.Adam(networks.parameters(), lr=RATE)
     for step in range(1, iterations + 1):
-        seconds = time.perf_counter() - began
+        seconds = clock.worked() - began
         progress = max((step - 1) / iterations, seconds / (time_budget or math.inf))
         if progress >= 1:
             return
@@ -72,7 +72,7 @@ def fitted(
         total.backward()  # type: ignore[no-untyped-call]
         optimizer.step()
         values = {name: term.item() for name, term in found.items()} | {"total": total.item()}
-        yield TracePoint(step, time.perf_counter() - began, values)
+        yield TracePoint(step, clock.worked() - began, values)
 
 
 def with_axes(uv: Tensor) -> Tensor:

@@ -17,7 +17,6 @@ import difflib
 import functools
 import json
 import os
-import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -29,18 +28,16 @@ from urllib.parse import urlsplit
 import platformdirs
 import pooch
 
-from benchmarks.cases.builtin import BUILTIN, sampled
-from benchmarks.cases.coloured import WAVES, coloured
+from benchmarks.cases import derived
+from benchmarks.cases.builtin import BUILTIN
 from parapoint.errors import InputError
 from parapoint.files.reading import FORMATS, read_parameterized, read_surface
 from parapoint.surfaces.parameterization import Parameterization
-from parapoint.surfaces.surface import Mesh, PointCloud, Surface
+from parapoint.surfaces.surface import PointCloud, Surface
 
 MIRROR = "PARAPOINT_DATA"
 """Environment variable that names a folder with the registry's files, such as paper/hand_1.obj."""
 
-MOST_NOISE = 0.1
-"""The most noise that a sampled cloud may have, as a fraction of the model's diagonal."""
 CONNECT_SECONDS, READ_SECONDS = 5, 60
 """Seconds that a server may take to answer, and then to send the next bytes."""
 
@@ -180,20 +177,20 @@ def canonical_name(case: str) -> str:
 
     Args:
         case: a name, the beginning of exactly one name, or a path to a file. If more than one
-            fits, a whole name comes first, then a file. "@noise=0.01" or "@uneven" after it stands
-            for a cloud sampled from that model (`benchmarks.cases.builtin.sampled`), "@smooth" or
-            "@fine" for one with colours (`benchmarks.cases.coloured`).
+            fits, a whole name comes first, then a file. An @ and what follows stand for a case
+            that is made from that model (`benchmarks.cases.derived`).
 
     Raises:
-        InputError: no name or file fits, several names begin so, or there is no such sampling.
+        InputError: no name or file fits, several names begin so, or the model has no such case.
     """
     known = names()
     if case in known or Path(case).is_file():
         return case
     model, at, how = case.rpartition("@")
     if at:
-        _sampling(how)
-        return f"{canonical_name(model)}@{how}"
+        name = canonical_name(model)
+        derived.check(name, how)
+        return f"{name}@{how}"
     begun = [name for name in known if case and name.startswith(case)]
     if len(begun) == 1:
         return begun[0]
@@ -206,60 +203,34 @@ def canonical_name(case: str) -> str:
     raise InputError(f"there is no model {case!r}; {hint}")
 
 
-def _sampling(how: str) -> dict[str, Any]:
-    """The arguments of `sampled` that the text after the @ of a case asks for.
-
-    Raises:
-        InputError: the text asks for nothing that there is.
-    """
-    if how in WAVES:
-        return {"waves": WAVES[how]}
-    if how == "uneven":
-        return {"is_uneven": True}
-    found = re.fullmatch(r"noise=(\d*\.?\d+)", how)
-    if found is None or float(found[1]) > MOST_NOISE:
-        raise InputError(
-            f"a cloud is sampled from a model by MODEL@noise=0.01 (a fraction of the diagonal, "
-            f"{MOST_NOISE} at most), MODEL@uneven, or with colours by MODEL@{' or @'.join(WAVES)}, "
-            f"not by @{how}"
-        )
-    return {"noise": float(found[1])}
-
-
-def _is_sampled(name: str) -> bool:
-    """Whether a canonical name is that of a sampled cloud."""
+def _is_derived(name: str) -> bool:
+    """Whether a canonical name is that of a case made from a model."""
     return "@" in name and not Path(name).is_file()
 
 
 def is_made_in_memory(case: str) -> bool:
-    """Whether a case is a built-in surface or a sampled cloud, rather than a file.
+    """Whether a case is built in or made from a model, rather than a file.
 
     Raises:
         InputError: as for `canonical_name`.
     """
     name = canonical_name(case)
-    return name in BUILTIN or _is_sampled(name)
+    return name in BUILTIN or _is_derived(name)
 
 
 def _model_name(name: str) -> str:
-    """The model that a sampled cloud is made from; for any other case, its own name."""
-    return name.rpartition("@")[0] if _is_sampled(name) else name
+    """The model that a case is made from; for any other case, its own name."""
+    return name.rpartition("@")[0] if _is_derived(name) else name
 
 
-def _sampled(name: str) -> tuple[PointCloud, PointCloud]:
-    """The sampled cloud of a canonical name, and where its points belong on the model.
+def _derived(name: str) -> tuple[Surface, Surface]:
+    """What is made from a model, by its canonical name, and where its points belong on the model.
 
     Raises:
         InputError: the model has no faces; as for `load`.
     """
     model, _, how = name.rpartition("@")
-    mesh = load(model)
-    if not isinstance(mesh, Mesh):
-        raise InputError(f"{model} has no faces to sample; it is a point cloud already")
-    if how in WAVES:
-        cloud = coloured(mesh, WAVES[how])
-        return cloud, cloud
-    return sampled(mesh, **_sampling(how))
+    return derived.derived(model, load(model), how)
 
 
 def exact_points(case: str) -> PointCloud | None:
@@ -272,9 +243,11 @@ def exact_points(case: str) -> PointCloud | None:
         MissingModelError: as for `load`.
     """
     name = canonical_name(case)
-    if not _is_sampled(name):
+    if not _is_derived(name):
         return None
-    cloud, exact = _sampled(name)
+    cloud, exact = _derived(name)
+    if not isinstance(cloud, PointCloud) or not isinstance(exact, PointCloud):
+        return None
     return exact if (cloud.points != exact.points).any() else None
 
 
@@ -309,15 +282,15 @@ def load(case: str) -> Surface:
     name = canonical_name(case)
     if name in BUILTIN:
         return BUILTIN[name]()
-    if _is_sampled(name):
-        return _sampled(name)[0]
+    if _is_derived(name):
+        return _derived(name)[0]
     return read_surface(path(name))
 
 
 def path(case: str) -> Path:
     """Where the file of a model is: in the mirror or the cache, its hash checked.
 
-    A user's own file stays where it is. The file of a sampled cloud is that of its model.
+    A user's own file stays where it is. The file of a case made from a model is the model's.
 
     Raises:
         InputError: as for `load`, or for a built-in surface, which has no file.

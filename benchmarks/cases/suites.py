@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from benchmarks.cases.builtin import BUILTIN
 from benchmarks.cases.coloured import WAVES
+from benchmarks.cases.derived import seam_digest
 from benchmarks.cases.models import registry
 from parapoint.errors import InputError
 
@@ -36,7 +37,10 @@ class Suite:
     @property
     def digest(self) -> str:
         """16 hexadecimal digits over what makes results comparable: cases, their files, seeds."""
-        files = [registry()[name].sha256 if name in registry() else "" for name in self.cases]
+        files = [
+            registry()[name].sha256 if name in registry() else seam_digest(name)
+            for name in self.cases
+        ]
         text = json.dumps([self.name, self.version, self.cases, files, self.seeds])
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
@@ -70,13 +74,14 @@ SAMPLED_MODELS = ("camelhead", "bunny_i_f10000", "cowhead_bff", "fairing-cross")
 COLOURED_MODELS = ("spot_c3d", "max_planck_i_f8000", "camelhead", "fertility")
 SAMPLINGS = ("noise=0", "noise=0.005", "noise=0.01", "uneven")
 
+NEFERTITI = "nefertiti-lowres_odedstein"
 PAPER_CASES = (
     "beetle_igl",
     "mannequin-devil",
     "keenan-ogre",
     "hand_1_i_f5000",
     "max_planck_i_f8000",
-    "nefertiti-lowres_odedstein",
+    NEFERTITI,
 )
 QUALITY_CASES = (
     "beetle_igl",
@@ -85,7 +90,7 @@ QUALITY_CASES = (
     "camelhead",
     "keenan-ogre",
     "mannequin-devil",
-    "nefertiti-lowres_odedstein",
+    NEFERTITI,
     "fertility",
     "rocker-arm",
     "fandisk",
@@ -141,6 +146,12 @@ SUITES: dict[str, Suite] = {
                 COMPUTED,
                 COMPUTED_CONFORMAL,
             ),
+        ),
+        Suite(
+            "drawn",
+            "Nefertiti along a seam drawn by hand, and along the automatic cut",
+            (f"{NEFERTITI}@drawn", NEFERTITI),
+            ("lscm", ISOMETRIC, ONE_ITERATION, CONFORMAL),
         ),
         Suite("disk", "Disks", members("disk"), (*MESH_METHODS, COMPUTED)),
         Suite("closed", "Closed surfaces of genus 0", members("closed"), (*MESH_METHODS, COMPUTED)),
@@ -229,6 +240,7 @@ SUITES: dict[str, Suite] = {
                 "nsm(time_budget=60)",
                 "fam(points=4096, subset=256, time_budget=60)",
                 "nuvo(points=4096, subset=256, time_budget=60)",
+                "nuvo(charts=4, time_budget=60)",
             ),
         ),
         Suite(

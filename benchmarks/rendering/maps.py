@@ -92,8 +92,12 @@ class Map:
 
     @cached_property
     def seams(self) -> FloatArray:
-        """(S, 2, 3) the edges of the surface along which the map is cut."""
-        return np.asarray(self.mesh.vertices[self.parameterization.seams(self.mesh)])
+        """(S, 2, 3) the edges of the surface along which the map is cut.
+
+        Those along which the vertices of the mesh itself are doubled are among them.
+        """
+        of = self._state if self._state.welded else self
+        return np.asarray(of.mesh.vertices[of.parameterization.seams(of.mesh)])
 
     def by_face(self, values: FloatArray) -> FloatArray:
         """(F,) `values` of the faces in `distortion`, NaN for the others."""

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from benchmarks.cases import models
+from benchmarks.cases.derived import is_drawn
 from benchmarks.cases.suites import Suite
 from benchmarks.store.archives import arrays_hash, disk_said, map_arrays, write_arrays
 from benchmarks.store.results import Store
@@ -93,7 +94,8 @@ def read(folder: Path, method: str, suite: Suite) -> Submission:
     """
     name = named(method)
     if not folder.is_dir():
-        raise InputError(f"{folder}: no such folder; a submission is a folder of OBJ files")
+        fault = "is no folder" if folder.exists() else "no such folder"
+        raise InputError(f"{folder}: {fault}; a submission is a folder of OBJ files")
     files = {path.stem: path for path in sorted(folder.iterdir()) if path.suffix.lower() == ENDING}
     faults = [
         f"{files[stem].name}: no case of {suite.name}" for stem in files.keys() - {*suite.cases}
@@ -103,7 +105,8 @@ def read(folder: Path, method: str, suite: Suite) -> Submission:
     clouds: list[str] = []
     for case in suite.cases:
         if case not in files:
-            (clouds if "@" in case else missing).append(case)
+            is_cloud = "@" in case and not is_drawn(case)
+            (clouds if is_cloud else missing).append(case)
             continue
         try:
             maps.append(_fitting(case, files[case]))

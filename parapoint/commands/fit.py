@@ -32,7 +32,7 @@ logger = logging.getLogger("parapoint")
 @click.option("--points", type=int, help="Most points that the map is fitted to.")
 @click.option("--iterations", type=int, help="Training steps.")
 @click.option("--subset", type=int, help="Points of a training step, before the last take all.")
-@click.option("--time-budget", type=float, metavar="S", help="Seconds of fitting at most.")
+@click.option("--time-budget", type=float, metavar="S", help="Seconds of processor time at most.")
 @click.option(
     "--distortion",
     help="What the map keeps: conformal, balanced (computed alone; its default) or isometric.",

@@ -40,7 +40,7 @@ from parapoint.textures.placing import BORDER
     metavar="FILE",
     help="FILE.glb, .obj, .ply or .npz.",
 )
-@click.option("--time-budget", type=float, metavar="S", help="Seconds at most.")
+@click.option("--time-budget", type=float, metavar="S", help="Seconds of processor time at most.")
 @click.option(
     "--components",
     default="together",

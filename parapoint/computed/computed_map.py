@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import logging
 import math
-import time
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from parapoint import clock
 from parapoint.computed.flattening import FlatMap, Say, flat_map
 from parapoint.computed.interpolation import Anchors, InterpolatedMap
 from parapoint.computed.parts import DISTORTIONS, Distortion
@@ -64,8 +64,8 @@ class ComputedMap(Estimator):
         distortion: "conformal" keeps angles, whatever becomes of an ear or a finger; "balanced"
             keeps them as far as every part keeps its area, along longer seams where need be;
             "isometric" keeps angles and areas alike.
-        time_budget: seconds that a fit may take; the number of points follows the machine's speed,
-            as busy as it is. None takes as long as it takes.
+        time_budget: seconds of work (`parapoint.clock`) that a fit may take; the number of points
+            follows the machine's speed. None takes as long as it takes.
         components: "together", one map of the whole surface; "each", one of each component, side by
             side in the plane; "largest", one of the largest alone, which then holds for all points.
         seed: of the draw of points.
@@ -96,13 +96,13 @@ class ComputedMap(Estimator):
         Raises:
             ReconstructionError: the points show no surface that can be followed and flattened.
         """
-        begun = time.monotonic()
+        begun = clock.worked()
         count = max(FEWEST_POINTS, round(self.points * share))
         budget = None if self.time_budget is None else self.time_budget * share
         deadline = math.inf if budget is None else begun + DESCENDING * budget
 
         def say(phase: str) -> None:
-            left = None if budget is None else max(0.0, begun + budget - time.monotonic())
+            left = None if budget is None else max(0.0, begun + budget - clock.worked())
             session.tell(Progress(phase, remaining=left))
 
         if budget is None:
@@ -118,7 +118,7 @@ class ComputedMap(Estimator):
                 len(cloud),
                 _rows_of(cloud[flat.missed], drawn.frame, surface),
             )
-        cut_short = time.monotonic() > deadline
+        cut_short = clock.worked() > deadline
         if cut_short:
             logger.warning(
                 "the time was up before the map was at its best; it is of %d points", len(cloud)
@@ -131,7 +131,7 @@ class ComputedMap(Estimator):
             "missed": len(flat.missed),
             "found": flat.facts,
             "cut_short": cut_short,
-            "seconds": round(time.monotonic() - begun, 3),
+            "seconds": round(clock.worked() - begun, 3),
         }
         return Fitted(held, drawn.frame, _on_surface(drawn), (), report)
 
@@ -194,13 +194,13 @@ def _computed_within(
     A map of `few` points comes first. It tells how fast this machine is on this surface, and it
     stays where the second map fails, or is cut short and worse.
     """
-    before = time.monotonic()
+    before = clock.worked()
     first: _Drawn | None = None
     try:
         first = _computed(surface, few, of, deadline, say)
     except ReconstructionError as error:
         fault = error
-    now = time.monotonic()
+    now = clock.worked()
     affordable = round(few * PLANNED * (deadline - now) / max(now - before, 1e-9))
     count = min(most, affordable)
     # Where the surface has no more points than the first map took, there is nothing to add.
@@ -211,7 +211,7 @@ def _computed_within(
             logger.warning("no map of %d points could be computed: %s", count, error)
             fault = error
         else:
-            is_whole = time.monotonic() < deadline
+            is_whole = clock.worked() < deadline
             # Of two that are as good as exact the one of more points stays.
             if (
                 first is None

@@ -10,12 +10,12 @@ unless it is to be conformal at any cost, such that every part keeps its area
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from parapoint import clock
 from parapoint.computed.denoising import denoised
 from parapoint.computed.layout import scaled_layout
 from parapoint.computed.parts import Distortion, parts_kept
@@ -155,7 +155,7 @@ def _flattened(
     row[reached] = np.arange(len(reached))
     missed = rows[~mesh.referenced]
     mesh = Mesh(mesh.vertices[reached], row[mesh.faces])
-    begun = time.monotonic()
+    begun = clock.worked()
     try:
         say("cutting")
         disk = seamed(mesh, distortion, begun + SEAM_SHARE * (deadline - begun))
@@ -179,7 +179,7 @@ def flat_map(
 
     Args:
         points: the cloud.
-        deadline: no descent takes a step after this time of `time.monotonic`.
+        deadline: no descent takes a step after this time of `clock.worked`.
         distortion: what the map keeps, see `parapoint.computed.parts`.
         say: is told what is being done.
 

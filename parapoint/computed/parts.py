@@ -45,7 +45,7 @@ def parts_kept(
         disk: a planar domain, faces counter-clockwise.
         uv: (V, 2) a conformal map of it, one to one.
         distortion: one of DISTORTIONS.
-        deadline: no step begins after this time of `time.monotonic`.
+        deadline: no step begins after this time of `clock.worked`.
     """
     if distortion == "conformal":
         return disk, uv
@@ -72,7 +72,7 @@ def towards_conformal(
     Args:
         disk: the domain, of area 1.
         uv: (V, 2) a map of it, one to one, of area 1 or so.
-        deadline: no step begins after this time of `time.monotonic`.
+        deadline: no step begins after this time of `clock.worked`.
         most_starved: share of the surface that may be starved of area.
     """
 

@@ -9,13 +9,13 @@ area they lead on to what the map would starve.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csgraph
 
+from parapoint import clock
 from parapoint.computed.parts import MOST_STARVED, Distortion
 from parapoint.computed.scale import area_discrepancy, even_scale, log_scale, mapped_areas, turning
 from parapoint.planar.embedding import embeddable, few_edges_graph, path_edges
@@ -63,7 +63,7 @@ def seamed(mesh: Mesh, distortion: Distortion = "conformal", deadline: float = m
         mesh: connected, manifold, oriented.
         distortion: all are cut for an even scale; "balanced" is cut on to what a conformal map
             starves, and so keeps both angles and parts.
-        deadline: no part is fed after this time of `time.monotonic`.
+        deadline: no part is fed after this time of `clock.worked`.
     """
     share = OPEN_SEAM if mesh.boundary_loops else CLOSED_SEAM
     budget = int(share * len(mesh.faces))
@@ -125,11 +125,11 @@ def _led(
         predict: what is wanted where.
         trials: times in a row that no cut may help before the rest is given up.
         budget: edges of all cuts at most.
-        deadline: no cut is sought after this time of `time.monotonic`.
+        deadline: no cut is sought after this time of `clock.worked`.
     """
     now, failed = predict(mesh), 0
     given_up: BoolArray = np.zeros(len(mesh.vertices), dtype=bool)
-    while failed < trials and not now.is_good and time.monotonic() < deadline:
+    while failed < trials and not now.is_good and clock.worked() < deadline:
         tips, around = _branches(now, given_up)
         longer = [
             (predict(cut_along(now.mesh, path)), len(path)) for path in tips if len(path) <= budget

@@ -5,11 +5,11 @@ from __future__ import annotations
 import dataclasses
 import logging
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
+from parapoint import clock
 from parapoint.estimator import Estimator
 from parapoint.fitting import Fitted, Progress, Session
 from parapoint.learned import presets
@@ -58,8 +58,8 @@ class ParaPoint(Estimator):
             takes the preset's value.
         points: training points.
         iterations: steps, the warm-up included.
-        time_budget: seconds of fitting; the schedule follows the time where that ends sooner, and
-            steps take as many points as leave enough of them on this machine.
+        time_budget: seconds of work (`parapoint.clock`); the schedule follows the time where that
+            ends sooner, and steps take as many points as leave enough of them on this machine.
         subset: points of a step before the last phase, which takes all.
         all_from: share of the run after which steps take all points.
         warm_up: share of the run that goes to the convex hull.
@@ -134,7 +134,7 @@ class ParaPoint(Estimator):
         """
         from parapoint.learned.trained_map import TrainedMap, threads
 
-        begun = time.monotonic()
+        begun = clock.worked()
         preset = self.numbers()
         count = max(FEWEST_POINTS, round(preset.points * share))
         budget = None if self.time_budget is None else self.time_budget * share
@@ -167,7 +167,7 @@ class ParaPoint(Estimator):
         found: dict[str, object] = {"start": preset.start}
         if preset.start == "computed":
             session.tell(Progress("computing a start"))
-            deadline = math.inf if budget is None else time.monotonic() + STARTING * budget
+            deadline = math.inf if budget is None else clock.worked() + STARTING * budget
             try:
                 start = computed_start(without_coincident(cloud), preset.gates, deadline)
             except ReconstructionError as error:
@@ -202,7 +202,7 @@ class ParaPoint(Estimator):
             if (state := checkpoint.read()) is not None:
                 trainer.resume(state[0], state[1]["trainer"])
                 trace = tuple(TracePoint(*row) for row in state[1]["trace"])
-        trainer.seconds += time.monotonic() - begun
+        trainer.seconds += clock.worked() - begun
         remaining = _remaining(trainer)
         for step in trainer.run():
             if step.losses:

@@ -61,7 +61,7 @@ def computed_start(points: FloatArray, gates: int, deadline: float = math.inf) -
     Args:
         points: the cloud.
         gates: columns of `Start.gates`; those beyond the number of seams are 0.
-        deadline: when the map is improved no more, by `time.monotonic`.
+        deadline: when the map is improved no more, by `clock.worked`.
 
     Raises:
         ReconstructionError: the points show no surface that can be followed and flattened.

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import time
 
 import torch
 from torch import Tensor, nn
 
+from parapoint import clock
 from parapoint.learned import losses
 from parapoint.learned.features import FeatureNetworks, GatedCut
 from parapoint.learned.optimizers import SOAP
@@ -152,12 +152,12 @@ def teach_gates(cut: GatedCut, start: Start, seed: int, steps: int, seconds: flo
     )
     optimizer = SOAP(list(parameters))
     generator = torch.Generator().manual_seed(seed)
-    end = time.perf_counter() + seconds
+    end = clock.worked() + seconds
     for step in range(steps):
         drawn = torch.randint(len(points), (GATE_POINTS,), generator=generator).to(device)
         gate_loss(*cut.sides(points[drawn]), gates[drawn]).backward()  # type: ignore[no-untyped-call]
         optimizer.step(SOAP.learning_rate * (1 - 0.9 * step / steps))
-        if time.perf_counter() > end:
+        if clock.worked() > end:
             break
     for parameter in parameters:
         parameter.requires_grad_(False)

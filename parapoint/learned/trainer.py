@@ -12,6 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from parapoint import clock
 from parapoint.learned import losses
 from parapoint.learned.batches import Cloud, lattice
 from parapoint.learned.networks import Cycle, SubNetworks, SurfaceNetworks
@@ -99,8 +100,8 @@ class Trainer:
         preset: every number of the run.
         seed: of all random draws: initial weights, subsets, perturbations.
         device: "cpu" or "cuda".
-        time_budget: seconds after which the run ends; the schedule follows the time where that
-            comes before the preset's number of iterations, and the points of a step are as many as
+        time_budget: seconds of work after which the run ends; the schedule follows them where they
+            end before the preset's number of iterations, and the points of a step are as many as
             leave ENOUGH_STEPS on this machine, from SHORT up to the preset's.
         networks: what to train, all its parameters; new networks of the preset by default, which
             may have several starts.
@@ -200,7 +201,7 @@ class Trainer:
             DivergedError: the loss blew up twice.
         """
         longest = 0.0
-        begin, processor = time.perf_counter(), time.process_time()
+        begin, processor = clock.worked(), time.process_time()
         while self.progress < 1 and self._fits(longest):
             phase = self._phase()
             if phase != self._phase_now:
@@ -210,7 +211,7 @@ class Trainer:
                 self._sums[name] = self._sums.get(name, 0.0) + value
             self._count += 1
             self.iteration += 1
-            now, processor_now = time.perf_counter(), time.process_time()
+            now, processor_now = clock.worked(), time.process_time()
             longest = max(longest, now - begin)
             self.seconds += now - begin  # what is done between steps counts too
             self.processor_seconds += processor_now - processor

@@ -10,11 +10,11 @@ this the boundary never crosses itself (`parapoint.planar.scaffold`).
 from __future__ import annotations
 
 import math
-import time
 
 import igl
 import numpy as np
 
+from parapoint import clock
 from parapoint.planar.embedding import FLATTEST, embedded_in_disk
 from parapoint.planar.scaffold import EXACT, LEAST_GAIN, descended, excess, of_area_one
 from parapoint.surfaces.areas import cross, signed_areas
@@ -40,7 +40,7 @@ def bijective_map(mesh: Mesh, layout: FloatArray | None, deadline: float = math.
         mesh: the domain, faces counter-clockwise.
         layout: (V, 2) a nearly conformal map whose scale is wanted, faces perhaps on one another;
             None where none is known.
-        deadline: no step begins after this time of `time.monotonic`: the map is then as far as it
+        deadline: no step begins after this time of `clock.worked`: the map is then as far as it
             came.
 
     Raises:
@@ -57,7 +57,7 @@ def bijective_map(mesh: Mesh, layout: FloatArray | None, deadline: float = math.
     else:
         uv = descended(mesh, uv, igl.SYMMETRIC_DIRICHLET, EXACT, deadline)
     uv = descended(mesh, uv, igl.CONFORMAL, EXACT, deadline)
-    if uv is start and time.monotonic() < deadline:
+    if uv is start and clock.worked() < deadline:
         raise BijectionError("no step lowers its distortion")
     return np.asarray(size * uv)
 

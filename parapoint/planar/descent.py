@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-import time
 
 import igl
 import numpy as np
 
+from parapoint import clock
 from parapoint.planar.bijection import BijectionError, embedded
 from parapoint.planar.crossing import crossing_vertices
 from parapoint.planar.domains import FlatteningError, check_triangles
@@ -44,7 +44,7 @@ class Run:
         grown_from: the run before the last branch, and the branch's path of vertices to the seam.
         is_free: whether the boundary may cross itself; the map is then without flips, but perhaps
             not one to one.
-        deadline: `time.monotonic()` after which no step begins.
+        deadline: `clock.worked()` after which no step begins.
     """
 
     def __init__(self, mesh: Mesh, deadline: float = math.inf, *, is_free: bool = False) -> None:
@@ -68,7 +68,7 @@ class Run:
     @property
     def is_late(self) -> bool:
         """Whether the time is up."""
-        return time.monotonic() > self.deadline
+        return clock.worked() > self.deadline
 
     def begin(self) -> None:
         """Start from Tutte's embedding.
@@ -141,8 +141,8 @@ class Run:
 
     def freed(self) -> Run:
         """This map as a free one that has settled, in half of the time that is left."""
-        left = self.deadline - time.monotonic()
-        free = Run(self.mesh, time.monotonic() + left / 2, is_free=True)
+        left = self.deadline - clock.worked()
+        free = Run(self.mesh, clock.worked() + left / 2, is_free=True)
         free.take(self.uv, self.start)
         free.tips = self.tips
         free.improve()

@@ -8,13 +8,13 @@ bijective maps"; libigl has it, on J. R. Shewchuk's Triangle).
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterator
 
 import igl
 import numpy as np
 from igl import triangle
 
+from parapoint import clock
 from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
 
@@ -56,7 +56,7 @@ def descended(
         uv: (V, 2) a map of it, one to one, of area 1 or so.
         energy: libigl's name of the energy.
         least: fall of the excess that a step must bring, beside LEAST_GAIN.
-        deadline: no step begins after this time of `time.monotonic`.
+        deadline: no step begins after this time of `clock.worked`.
     """
     before = np.inf
     for moved in steps_down(mesh, uv, energy, deadline):
@@ -79,7 +79,7 @@ def cut_opened(
         mesh: the domain after the cut, of area 1.
         uv: (V, 2) the map before the cut, one to one but for the copies of the cut's vertices.
         energy: libigl's name of the energy.
-        deadline: no step begins after this time of `time.monotonic`.
+        deadline: no step begins after this time of `clock.worked`.
     """
     _, place, copies = np.unique(uv, axis=0, return_inverse=True, return_counts=True)
     uv = moved_apart(mesh, uv, copies[place.reshape(-1)] > 1)
@@ -139,7 +139,7 @@ def steps_down(
         state,
     )
     for _ in range(most):
-        if time.monotonic() > deadline:
+        if clock.worked() > deadline:
             return
         moved = np.array(triangle.scaf_solve(1, state)[:, :2]) / LARGE
         if not (signed_areas(moved, mesh.faces) > 0).all():  # nor if not a number
@@ -164,7 +164,7 @@ def free_steps_down(
         0.0,
     )
     for _ in range(MOST_STEPS):
-        if time.monotonic() > deadline:
+        if clock.worked() > deadline:
             return
         moved = np.ascontiguousarray(igl.slim_solve(state, 1)[:, :2]) / LARGE
         if not (signed_areas(moved, mesh.faces) > 0).all():

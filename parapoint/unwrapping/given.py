@@ -22,7 +22,7 @@ def unwrapped_along(mesh: Mesh, seams: IntArray, deadline: float = math.inf) -> 
     Args:
         mesh: manifold and consistently oriented.
         seams: (S, 2) edges along which the mesh is cut.
-        deadline: `time.monotonic()` after which no step begins.
+        deadline: `clock.worked()` after which no step begins.
 
     Raises:
         InputError: the mesh is not so, or a triangle has no area.

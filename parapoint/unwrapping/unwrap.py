@@ -6,13 +6,13 @@ import contextlib
 import dataclasses
 import logging
 import math
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
+from parapoint import clock
 from parapoint.computed.computed_map import ComputedMap
 from parapoint.computed.parts import DISTORTIONS, towards_conformal
 from parapoint.computed.reconstruction import ReconstructionError
@@ -66,8 +66,8 @@ class Unwrap:
 
     Attributes:
         points: of the computed map; None for as many as show where the mesh should open.
-        time_budget: seconds for each component, or None for no bound. No step begins after that;
-            the map is then as good as it has become.
+        time_budget: seconds of work (`parapoint.clock`) for each component, or None for no bound.
+            No step begins after that; the map is then as good as it has become.
         price: what the symmetric Dirichlet energy (4 at least) must fall by for each sqrt(area) of
             seam; None for the learned seam, no shorter and no longer. Under a bound on the energy
             it is not asked.
@@ -120,12 +120,12 @@ class Unwrap:
         preparation = prepared(mesh, self.requires)
         maps = []
         left = sum(len(part.faces) for part in preparation.parts if isinstance(part, Mesh))
-        end = math.inf if self.time_budget is None else time.monotonic() + self.time_budget
+        end = math.inf if self.time_budget is None else clock.worked() + self.time_budget
         for part in preparation.parts:
             assert isinstance(part, Mesh)
             method = self
             if self.time_budget is not None:
-                share = max(end - time.monotonic(), 0.0) * len(part.faces) / left
+                share = max(end - clock.worked(), 0.0) * len(part.faces) / left
                 method = dataclasses.replace(self, time_budget=max(share, LEAST_TIME))
             maps.append(method.parameterize(part, seed=seed))
             left -= len(part.faces)
@@ -147,12 +147,12 @@ class Unwrap:
         mesh = sound(surface)
         deadline = math.inf
         if self.time_budget is not None:
-            deadline = time.monotonic() + STEPPING * self.time_budget
+            deadline = clock.worked() + STEPPING * self.time_budget
         seam: BoolArray = np.zeros(len(mesh.edges), dtype=bool)
         computed: dict[str, object] = {"not_asked": "the mesh is a disk, with or without holes"}
         run = None
         if self._grows and mesh.is_planar_domain:
-            half = time.monotonic() + (deadline - time.monotonic()) / 2
+            half = clock.worked() + (deadline - clock.worked()) / 2
             with contextlib.suppress(FlatteningError):  # too thin for a start: it is cut first
                 run = self._grown(mesh, seam, deadline if self.max_distortion is None else half)
         if run is None or (self.max_distortion is not None and self._is_cut_or_in_need(run)):
@@ -197,7 +197,7 @@ class Unwrap:
         Args:
             mesh: what is to be mapped.
             seam: edges that make a planar domain of it.
-            deadline: no step begins after this time of `time.monotonic`.
+            deadline: no step begins after this time of `clock.worked`.
         """
         run = Run(embeddable(cut_along(mesh, mesh.edges[seam])), deadline)
         run.begin()
@@ -218,7 +218,7 @@ class Unwrap:
         points = self.points or _enough_points(mesh)
         budget = None
         if self.time_budget is not None:
-            budget = SHARE_OF_SEAM * max(deadline - time.monotonic(), LEAST_TIME)
+            budget = SHARE_OF_SEAM * max(deadline - clock.worked(), LEAST_TIME)
         computed = ComputedMap(points, distortion="conformal", time_budget=budget)
         try:
             with _unsaid("parapoint.computed.computed_map"):

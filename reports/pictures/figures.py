@@ -23,6 +23,7 @@ from PIL import Image as Images
 from PIL import ImageColor
 from pypdf import PdfWriter
 
+from benchmarks.cases.derived import is_drawn
 from benchmarks.store.rows import ResultRow
 from parapoint.files.targets import complete_file, write_text
 from parapoint.sources import source_hash
@@ -205,14 +206,15 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
         ]
     for case in told:
         rows = tuple(row for row in contents.rows if row.case == case)
-        if is_cut(contents, case) or contents.has_artist(case):
+        if is_cut(contents, case) or contents.has_artist(case) or is_drawn(case):
             found.append(
                 Drawing(
                     f"cut-{slug(case)}",
                     f"{case}: hand-made, automatic and learned cut",
-                    "The model; the artist's own map, where the file has one (the hand-made cut of "
-                    "the paper's nefertiti is not public); SLIM on the automatic cut, the same for "
-                    f"every method that needs one; ParaPoint with the seam it learned. {checker}",
+                    "The model; the artist's own map, where the file has one; SLIM on the "
+                    "automatic cut, the same for every method that needs one, or along the seam "
+                    "that we drew by hand (that of the paper's nefertiti is not public); ParaPoint "
+                    f"with the seam it learned. {checker}",
                     rows,
                     partial(cut_model, contents, case, pictures),
                 )

@@ -10,6 +10,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
+from benchmarks.cases.derived import is_drawn
 from benchmarks.rendering.maps import ANGLE_SCALE, AREA_SCALE
 from benchmarks.store.rows import ResultRow
 from parapoint.surfaces.preparation import CUT
@@ -170,8 +171,10 @@ def cut_model(contents: Contents, case: str, pictures: Path) -> Figure | None:
         row = contents.shown(case, label)
         learned = "learned seam" if label.method == "parapoint" else "uncut"
         was_cut = CUT in row.preprocessing if row else learned == "uncut" and is_cut(contents, case)
-        cut = "automatic cut" if was_cut else learned
-        shown = pictures_of(contents, case, label, ("checker-1", "layout"), pictures)
+        cut = "automatic cut" if was_cut else "drawn seam" if is_drawn(case) else learned
+        # A seam that somebody draws is where the front does not show it.
+        view = "checker-2" if is_drawn(case) else "checker-1"
+        shown = pictures_of(contents, case, label, (view, "layout"), pictures)
         text = values_text(contents, row) if row else ""
         panels.append((f"{label.name}, {cut}", text, shown))
     if not panels:

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
+from benchmarks.cases.derived import is_drawn, undrawn
 from benchmarks.cases.models import Model, PublishedFigure, registry
 from benchmarks.metrics.table import METRICS
 from reports.ranking import may_rank
@@ -33,7 +34,8 @@ SAME_METHOD: dict[str, tuple[str, dict[str, object]]] = {
 """The method here, and the parameters it must have, that a published figure speaks of."""
 
 CUT_BY_HAND = "cut by hand"
-"""The note of a figure whose model somebody cut by hand, which nobody has done here."""
+"""The note of a figure whose model somebody cut by hand. It is compared with maps of the model cut
+along a seam that was drawn here, and with no other."""
 
 Word = Literal["reproduced", "better", "worse", "not comparable"]
 
@@ -81,24 +83,36 @@ class Verdict:
             return "not comparable", "there is no map here"
         if self.claim not in {"same model", "likely"}:
             return "not comparable", "our file is a stand-in"
-        if self.figure.note == CUT_BY_HAND:
+        if self.figure.note == CUT_BY_HAND and not is_drawn(self.case):
             return "not comparable", f"published: {CUT_BY_HAND}"
         metric = METRICS[self.figure.metric]
         if not may_rank(self.grade, angles=metric.group == "conformal"):
             return "not comparable", f"our map is {self.grade}"
+        seam = ", along our own seam, as theirs is not public" if is_drawn(self.case) else ""
         difference = self.measured - self.figure.value
         if abs(difference) <= self.figure.tolerance:
-            return "reproduced", f"within {self.figure.tolerance:.3f}"
+            return "reproduced", f"within {self.figure.tolerance:.3f}{seam}"
         side = "lower" if difference < 0 else "higher"
-        said = f"{side} by {abs(difference):.3f}"
+        said = f"{side} by {abs(difference):.3f}{seam}"
         if self.grade == "collapsed":
             said += ", but our map is collapsed"
         return ("better" if side == metric.better else "worse"), said
 
 
 def model(case: str) -> Model | None:
-    """The registry's entry of a model, None for a built-in surface or a user's file."""
-    return registry().get(case)
+    """The registry's entry of a model, None for a built-in surface or a user's file.
+
+    That of a model cut along a drawn seam is the model's.
+    """
+    return registry().get(undrawn(case))
+
+
+def figures(case: str) -> tuple[PublishedFigure, ...]:
+    """The published figures that speak of a case: of a model cut by hand, those of one so cut."""
+    entry = model(case)
+    if entry is None or not entry.paper_name:
+        return ()
+    return tuple(row for row in entry.published if not is_drawn(case) or row.note == CUT_BY_HAND)
 
 
 def claim_text(case: str) -> str:
@@ -115,10 +129,7 @@ def claim_reason(case: str) -> str:
 
 def published_values(case: str) -> dict[str, float]:
     """The published conformality of the model that `case` stands for, by method."""
-    entry = model(case)
-    if entry is None or not entry.paper_name:
-        return {}
-    return {row.method: row.value for row in entry.published if row.metric == METRIC}
+    return {row.method: row.value for row in figures(case) if row.metric == METRIC}
 
 
 def verdicts(contents: Contents) -> list[Verdict]:
@@ -129,10 +140,7 @@ def verdicts(contents: Contents) -> list[Verdict]:
     """
     found = []
     for case in contents.cases:
-        entry = model(case)
-        if entry is None or not entry.paper_name:
-            continue
-        for figure in entry.published:
+        for figure in figures(case):
             labels = [label for label in contents.methods if _speaks_of(figure, label)]
             found += list(_verdicts(contents, case, figure, labels))
     return found

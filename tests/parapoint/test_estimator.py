@@ -270,7 +270,7 @@ def test_a_time_budget_ends_the_fit() -> None:
 
 def test_the_time_that_remains_is_told_by_the_pace_of_the_steps(monkeypatch) -> None:
     now, told = [100.0], []
-    monkeypatch.setattr("parapoint.learned.trainer.time.perf_counter", lambda: now[0])
+    monkeypatch.setattr("parapoint.clock.worked", lambda: now[0])
 
     def tell(progress) -> None:
         told.append(round(progress.remaining, 3))

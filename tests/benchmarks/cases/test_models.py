@@ -15,7 +15,7 @@ import pytest
 import requests
 from numpy.testing import assert_allclose
 
-from benchmarks.cases import models
+from benchmarks.cases import derived, models
 from benchmarks.cases.builtin import BUILTIN
 from benchmarks.cases.models import MissingModelError
 from benchmarks.metrics.table import METRICS
@@ -311,6 +311,36 @@ def test_sampled_clouds_are_cases():
     assert models.exact_points("swiss_roll") is None
     assert models.info("swiss_roll@uneven") is None
     assert models.missing(["swiss_roll@uneven", "swiss_roll"]) == {}
+
+
+def test_a_model_is_cut_along_the_seam_drawn_on_it(tmp_path, monkeypatch):
+    """A seam along an edge path of a ball, from a file with a remark and repeated, turned edges."""
+    ball = models.load("sphere")
+    a, b, c = ball.faces[0]
+    file = tmp_path / "sphere.txt"
+    file.write_text(f"# drawn by a child\n{a} {b}\n{c} {b}\n{b} {a}\n")
+    monkeypatch.setattr(derived, "seam_file", lambda model: tmp_path / f"{model}.txt")
+    mesh = models.load("sphere@drawn")
+    assert mesh.topology == "disk"
+    assert len(mesh.vertices) == len(ball.vertices) + 1  # the middle vertex has two copies
+    assert (mesh.vertices[mesh.faces] == ball.vertices[ball.faces]).all()
+    assert models.exact_points("sphere@drawn") is None
+    assert len(models.load("sphere@uneven").points) == 8_000
+    with pytest.raises(
+        InputError, match="nobody has drawn a seam on torus; there is one on sphere"
+    ):
+        models.load("torus@drawn")
+
+
+def test_each_drawn_seam_opens_its_model_to_a_disk():
+    if not os.environ.get(models.MIRROR):
+        pytest.skip(f"set {models.MIRROR} to check the real models")
+    files = sorted(derived.seam_file("").parent.glob("*.txt"))
+    assert files
+    for file in files:
+        model = models.load(file.stem)
+        assert model.topology != "disk"
+        assert derived.derived(file.stem, model, "drawn")[0].topology == "disk"
 
 
 @pytest.mark.usefixtures("no_network")

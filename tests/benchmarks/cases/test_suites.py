@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 
 from baselines import registry
-from benchmarks.cases import models
+from benchmarks.cases import derived, models
 from benchmarks.cases.builtin import BUILTIN
 from benchmarks.cases.suites import SUITES, suite
 from parapoint import InputError
@@ -39,6 +39,7 @@ def test_the_suites():
         "field",
         "gpu",
         "bake",
+        "drawn",
     }
     assert expected == set(SUITES)
     assert SUITES["builtin"].cases == tuple(BUILTIN)
@@ -147,3 +148,11 @@ def test_the_field_has_equal_budgets():
     assert {budget for budget in budgets if budget} == {60.0}
     assert len([budget for budget in budgets if budget]) >= 7
     assert SUITES["field"].cases == (*SUITES["paper"].cases, "camelhead")
+
+
+def test_a_drawn_seam_is_part_of_what_makes_results_comparable(tmp_path, monkeypatch):
+    before = SUITES["drawn"].digest
+    other = tmp_path / "seam.txt"
+    other.write_text("0 1\n")
+    monkeypatch.setattr(derived, "seam_file", lambda _: other)
+    assert SUITES["drawn"].digest != before

@@ -105,3 +105,13 @@ def test_the_outline_is_the_boundary_of_the_charts() -> None:
     lengths = np.linalg.norm(outline[:, 1] - outline[:, 0], axis=1)
     area = mesh.face_areas.sum()
     assert lengths.sum() == pytest.approx(4 * np.sqrt(area))
+
+
+def test_a_seam_of_doubled_vertices_is_drawn_as_one_of_the_map() -> None:
+    """Two triangles that meet in an edge, whose ends each has for itself."""
+    points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    mesh = Mesh(points, [[0, 1, 2], [3, 4, 5]])
+    uv = np.array(points, dtype=float)[:, :2] + np.repeat([[0, 0], [1, 0]], 3, axis=0)
+    found = Map(mesh, Parameterization(uv, mesh.faces))
+    assert sorted(found.seams[0].tolist()) == [[0, 1, 0], [1, 0, 0]]
+    assert len(found.seams) == 1

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import torch
 
+from parapoint import clock
 from parapoint.errors import InputError
 from parapoint.learned import losses, trainer
 from parapoint.learned.networks import Cycle, GridBranch, PointBranch
@@ -141,8 +142,8 @@ def test_the_learning_rate_follows_a_cosine() -> None:
 
 
 def test_the_schedule_follows_a_time_budget_that_ends_first(monkeypatch) -> None:
-    clock = iter(range(1000))
-    monkeypatch.setattr(trainer.time, "perf_counter", lambda: float(next(clock)))  # 1 s a step
+    ticks = iter(range(1000))
+    monkeypatch.setattr(clock, "worked", lambda: float(next(ticks)))  # 1 s a step
     preset = replace(TINY, warm_up=0.25, all_from=0.75)
     of = Trainer(sphere(), preset, seed=0, device="cpu", time_budget=10.0)
     steps = list(of.run())
@@ -164,8 +165,8 @@ def test_the_schedule_follows_a_time_budget_that_ends_first(monkeypatch) -> None
 def test_a_time_budget_chooses_the_points_of_a_step(
     monkeypatch: pytest.MonkeyPatch, budget: float, most: int, expected: int
 ) -> None:
-    clock = iter(range(1000))
-    monkeypatch.setattr(trainer.time, "perf_counter", lambda: float(next(clock)))  # 1 s a step
+    ticks = iter(range(1000))
+    monkeypatch.setattr(clock, "worked", lambda: float(next(ticks)))  # 1 s a step
     monkeypatch.setattr(Trainer, "_step", lambda _: {"total": 1.0})
     preset = replace(TINY, subset=most, iterations=10**6)
     of = Trainer(sphere(), preset, seed=0, device="cpu", time_budget=budget)
@@ -304,7 +305,7 @@ def test_the_last_phase_fills_the_time_that_its_own_steps_fit_in(monkeypatch) ->
     # Steps of 4 s on the hull, which lasts until 5 of 20 s are over: two of them. Then steps of
     # 1 s: 12 more fit. Judged by the longest step of the hull, the run would end after 9 of them.
     times = iter([0.0, 4.0, *range(8, 40)])
-    monkeypatch.setattr(trainer.time, "perf_counter", lambda: float(next(times)))
+    monkeypatch.setattr(clock, "worked", lambda: float(next(times)))
     preset = replace(TINY, warm_up=0.25, all_from=1.0)
     of = Trainer(sphere(), preset, seed=0, device="cpu", time_budget=20.0)
     steps = list(of.run())

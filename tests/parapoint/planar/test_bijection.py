@@ -3,9 +3,10 @@ import numpy as np
 import pytest
 
 from benchmarks.metrics.evaluation import evaluate
+from parapoint import clock
 from parapoint.computed.layout import scaled_layout
 from parapoint.computed.scale import even_scale
-from parapoint.planar import bijection, scaffold
+from parapoint.planar import bijection
 from parapoint.planar.bijection import (
     BijectionError,
     bijective_map,
@@ -151,7 +152,7 @@ def test_the_descents_end_with_the_time_and_leave_what_they_have(monkeypatch) ->
     mesh = ramp()
     whole = bijective_map(mesh, None)
     steps = iter(range(1000))
-    monkeypatch.setattr(scaffold.time, "monotonic", lambda: float(next(steps)))
+    monkeypatch.setattr(clock, "worked", lambda: float(next(steps)))
     some = bijective_map(
         mesh, None, deadline=4.5
     )  # five steps of the first descent, none of the others

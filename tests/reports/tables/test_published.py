@@ -3,11 +3,20 @@ import dataclasses
 import pytest
 
 from benchmarks.cases.models import registry
-from reports.contents import contents
-from reports.tables.published import claim_reason, claim_text, published_values, verdicts
+from reports.contents import Label, contents
+from reports.tables.published import (
+    Verdict,
+    claim_reason,
+    claim_text,
+    figures,
+    published_values,
+    verdicts,
+)
 from reports.tables.suites import against_published
 
 from ..conftest import DEVIL, HAND, NEFERTITI
+
+LABEL = Label("slim", "{}", "SLIM", "", "SLIM")
 
 
 def test_published_values_and_claims():
@@ -67,6 +76,18 @@ def test_a_cut_by_hand_is_not_compared_with_an_automatic_one(results):
     verdict = next(v for v in verdicts(contents(results)[0]) if v.case == NEFERTITI)
     verdict = dataclasses.replace(verdict, measured=0.089, grade="usable")
     assert verdict.text == "not comparable: published: cut by hand"
+
+
+def test_only_a_model_cut_along_a_drawn_seam_is_compared_with_one_cut_by_hand():
+    drawn = f"{NEFERTITI}@drawn"
+    assert published_values(drawn) == {"SLIM": 0.089}
+    assert claim_text(drawn) == claim_text(NEFERTITI) == "likely"
+    assert published_values(f"{HAND}@drawn") == {}
+    (figure,) = figures(drawn)
+    verdict = Verdict(drawn, "likely", figure, LABEL, 0.093, "usable")
+    own = "along our own seam, as theirs is not public"
+    assert verdict.text == f"reproduced: within 0.009, {own}"
+    assert dataclasses.replace(verdict, measured=0.05).text == f"better: lower by 0.039, {own}"
 
 
 def test_the_table_names_model_metric_unit_tolerance_trust_and_verdict(results):
