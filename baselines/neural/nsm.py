@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from parapoint.planar.descent import Run, sound
 from parapoint.planar.growth import PRICE, Need, grown
 from parapoint.surfaces.parameterization import Parameterization, TracePoint
 from parapoint.surfaces.surface import Mesh, Surface
+
+if TYPE_CHECKING:
+    from baselines.neural.stepping import Terms
 
 FLATTENING_SHARE = 0.5
 """Share of a time budget that the map to be fitted takes at most."""
@@ -44,7 +47,7 @@ class NSM(NeuralMethod):
         points: samples of the triangles.
         iterations: steps of both trainings together.
         subset: samples of a step.
-        time_budget: seconds of processor time, the flattening among them.
+        time_budget: seconds of work, that of the flattening among them.
     """
 
     points: int = 100_000
@@ -69,7 +72,9 @@ class NSM(NeuralMethod):
         """
         import torch
 
-        from baselines.neural import nsm_networks as of
+        from baselines.neural import nsm_training as of
+        from baselines.neural.nsm_networks import Refinement, SurfaceMap
+        from baselines.neural.stepping import trained
 
         if not isinstance(surface, Mesh):
             raise UnsupportedError("needs faces; the surface is a point cloud")
@@ -81,7 +86,7 @@ class NSM(NeuralMethod):
         solid = (flat.mesh.vertices - flat.mesh.vertices.mean(axis=0)) / unit
         triangles = of.Triangles(*(torch.as_tensor(at[corners]) for at in (inside, solid)))
         generator = torch.Generator().manual_seed(seed)
-        fitted, refined = of.SurfaceMap(generator), of.Refinement(generator)
+        fitted, refined = SurfaceMap(generator), Refinement(generator)
         samples = triangles.drawn(self.points, generator)
 
         def chosen() -> torch.Tensor:
@@ -89,13 +94,13 @@ class NSM(NeuralMethod):
 
         trace: list[TracePoint] = []
 
-        def train(network: torch.nn.Module, terms: of.Terms, rate: float, end: float) -> None:
+        def train(network: torch.nn.Module, terms: Terms, rate: float, end: float) -> None:
             steps = round(end * self.iterations) - len(trace)
             left = None
             if self.time_budget is not None:
                 spent = clock.worked() - began
                 left = (self.time_budget - spent) * (end if network is fitted else 1.0)
-            for losses in of.trained(network, terms, rate, steps, left):
+            for losses in trained(network, terms, rate, steps, left):
                 trace.append(TracePoint(len(trace) + 1, clock.worked() - began, losses))
 
         at_fit, at_refinement = of.RATES

@@ -242,6 +242,7 @@ SUITES: dict[str, Suite] = {
                 "nsm(time_budget=60)",
                 "fam(points=4096, subset=256, time_budget=60)",
                 "nuvo(points=4096, subset=256, time_budget=60)",
+                "nuvo(charts=4, time_budget=60)",
             ),
         ),
         Suite(
