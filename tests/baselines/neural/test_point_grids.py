@@ -197,7 +197,7 @@ def test_each_part_of_reggeonet_takes_jumps_away(monkeypatch):
 
 def test_a_patch_of_flattening_net_is_small_enough_to_assign(monkeypatch):
     method = FlatteningNet(iterations=2, subset=100)
-    assert method.parameterize(ball(400), seed=0).report["patches"] == 1
+    assert method.parameterize(ball(200), seed=0).report["patches"] == 1
     monkeypatch.setattr(flattening_net, "BLOCK", 8)
     result = method.parameterize(ball(400), seed=0)
     assert result.report["patches"] == 9
