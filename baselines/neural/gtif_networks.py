@@ -32,7 +32,8 @@ class FilteredGrid(GridSheet):
         seen = torch.cat([self.grid.places, folded], dim=1)
         embedded = self.embedding(seen[None])[0]
         apart = (embedded[:, None] - embedded[self.grid.near]).square().sum(2)
-        return (-apart).masked_fill(~self.grid.is_near, -torch.inf).softmax(dim=1)
+        weights: Tensor = (-apart).masked_fill(~self.grid.is_near, -torch.inf).softmax(dim=1)
+        return weights
 
     def nodes(self) -> tuple[Tensor, Tensor]:
         """See `GridSheet`: Σ h_l A^l S with Σ h_l = 1, which leaves a constant as it is."""
