@@ -69,6 +69,8 @@ METHODS: dict[str, str] = {
     "elestruc": "baselines.neural.elestruc:EleStruc",
     "gtif": "baselines.neural.gtif:GTIF",
     "tearingnet": "baselines.neural.tearingnet:TearingNet",
+    "flattening_net": "baselines.neural.flattening_net:FlatteningNet",
+    "reggeonet": "baselines.neural.reggeonet:RegGeoNet",
     "nuvo": "baselines.neural.nuvo:Nuvo",
     "nsm": "baselines.neural.nsm:NSM",
 }

@@ -64,6 +64,8 @@ DISPLAY: dict[str, tuple[str, str]] = {
     "elestruc": ("EleStruc", ""),
     "gtif": ("GTIF", ""),
     "tearingnet": ("TearingNet", ""),
+    "flattening_net": ("Flattening-Net", ""),
+    "reggeonet": ("RegGeoNet", ""),
     "nsm": ("Neural Surface Maps", ""),
     "fam": ("FAM", ""),
     "artist+slim": ("Artist's cut + SLIM", ""),

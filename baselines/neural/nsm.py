@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from baselines.neural.method import NeuralMethod
+from parapoint import clock
 from parapoint.method import UnsupportedError
 from parapoint.planar.descent import Run, sound
 from parapoint.planar.growth import PRICE, Need, grown
 from parapoint.surfaces.parameterization import Parameterization, TracePoint
 from parapoint.surfaces.surface import Mesh, Surface
 
+if TYPE_CHECKING:
+    from baselines.neural.stepping import Terms
+
 FLATTENING_SHARE = 0.5
-"""Share of a time budget that the map to be fitted takes at most, in seconds on the wall."""
+"""Share of a time budget that the map to be fitted takes at most."""
 REFINEMENT_SHARE = 0.15
 """Share of the steps, and of what is left of the time budget, that the refinement takes."""
 EXTENT = 8.0
@@ -44,7 +47,7 @@ class NSM(NeuralMethod):
         points: samples of the triangles.
         iterations: steps of both trainings together.
         subset: samples of a step.
-        time_budget: seconds of processor time, the flattening among them.
+        time_budget: seconds of work, that of the flattening among them.
     """
 
     points: int = 100_000
@@ -69,11 +72,13 @@ class NSM(NeuralMethod):
         """
         import torch
 
-        from baselines.neural import nsm_networks as of
+        from baselines.neural import nsm_training as of
+        from baselines.neural.nsm_networks import Refinement, SurfaceMap
+        from baselines.neural.stepping import trained
 
         if not isinstance(surface, Mesh):
             raise UnsupportedError("needs faces; the surface is a point cloud")
-        began, processor = time.perf_counter(), time.process_time()
+        began = clock.worked()
         flat = flattened(surface, self.time_budget)
         corners, uv = flat.mesh.faces, flat.uv
         unit = float(np.ptp(uv, axis=0).max()) / EXTENT
@@ -81,7 +86,7 @@ class NSM(NeuralMethod):
         solid = (flat.mesh.vertices - flat.mesh.vertices.mean(axis=0)) / unit
         triangles = of.Triangles(*(torch.as_tensor(at[corners]) for at in (inside, solid)))
         generator = torch.Generator().manual_seed(seed)
-        fitted, refined = of.SurfaceMap(generator), of.Refinement(generator)
+        fitted, refined = SurfaceMap(generator), Refinement(generator)
         samples = triangles.drawn(self.points, generator)
 
         def chosen() -> torch.Tensor:
@@ -89,14 +94,14 @@ class NSM(NeuralMethod):
 
         trace: list[TracePoint] = []
 
-        def train(network: torch.nn.Module, terms: of.Terms, rate: float, end: float) -> None:
+        def train(network: torch.nn.Module, terms: Terms, rate: float, end: float) -> None:
             steps = round(end * self.iterations) - len(trace)
             left = None
             if self.time_budget is not None:
-                spent = time.process_time() - processor
+                spent = clock.worked() - began
                 left = (self.time_budget - spent) * (end if network is fitted else 1.0)
-            for losses in of.trained(network, terms, rate, steps, left):
-                trace.append(TracePoint(len(trace) + 1, time.perf_counter() - began, losses))
+            for losses in trained(network, terms, rate, steps, left):
+                trace.append(TracePoint(len(trace) + 1, clock.worked() - began, losses))
 
         at_fit, at_refinement = of.RATES
         first = 1 - REFINEMENT_SHARE
@@ -131,7 +136,7 @@ def flattened(mesh: Mesh, time_budget: float | None) -> Run:
     """The isometric map of `automatic+slim`, in its part of the time."""
     run = Run(sound(mesh))
     if time_budget is not None:
-        run.deadline = time.monotonic() + FLATTENING_SHARE * time_budget
+        run.deadline = clock.worked() + FLATTENING_SHARE * time_budget
     run.begin()
     run.improve()
     run = grown(run, Need(PRICE))

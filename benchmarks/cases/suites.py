@@ -241,9 +241,12 @@ SUITES: dict[str, Suite] = {
                 "elestruc(time_budget=60)",
                 "gtif(time_budget=60)",
                 "tearingnet(time_budget=60)",
+                "flattening_net(time_budget=60)",
+                "reggeonet(time_budget=60)",
                 "nsm(time_budget=60)",
                 "fam(points=4096, subset=256, time_budget=60)",
                 "nuvo(points=4096, subset=256, time_budget=60)",
+                "nuvo(charts=4, time_budget=60)",
             ),
         ),
         Suite(

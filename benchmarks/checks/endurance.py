@@ -65,6 +65,8 @@ BUDGETS = {
             "elestruc",
             "gtif",
             "tearingnet",
+            "flattening_net",
+            "reggeonet",
             "nsm",
         ),
         "points=120, subset=100, iterations=2",

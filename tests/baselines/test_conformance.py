@@ -31,6 +31,8 @@ ARGUMENTS = {
     "gtif": {"points": 120, "subset": 100, "iterations": 2},
     "tearingnet": {"points": 120, "subset": 100, "iterations": 2},
     "nsm": {"points": 120, "subset": 100, "iterations": 4},
+    "flattening_net": {"points": 120, "subset": 100, "iterations": 2},
+    "reggeonet": {"points": 120, "subset": 100, "iterations": 2},
     "nuvo": {"points": 120, "subset": 100, "iterations": 2},
     "geometry_image": {"side": 17},
     "smith_schaefer": {"iterations": 60},

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from baselines.da_wand import DAWand, Region, distortion, flattened, neighbours
+from baselines.da_wand import DAWand
+from baselines.disk_regions import Region, distortion, flattened, neighbours
 from parapoint.errors import InputError
 from parapoint.surfaces.surface import Mesh, PointCloud
 from parapoint.testing import defective, irregular_disk, sphere
