@@ -237,3 +237,18 @@ def legend_below(made: Figure, places: Sequence[Axes]) -> None:
         if columns == 1 or legend.get_window_extent().width < made.bbox.width:
             break
         legend.remove()
+    boxes = [place.get_tightbbox() for place in places]
+    lowest = min(box.y0 for box in boxes if box is not None)
+    _grow(made, (legend.get_window_extent().y1 - lowest) / made.dpi)
+
+
+def _grow(made: Figure, room: float) -> None:
+    """Make `room` below the panels of a figure, in inches, where there is none."""
+    if room <= 0:
+        return
+    width, height = made.get_size_inches()
+    made.set_size_inches(width, height + room)
+    for place in made.axes:
+        x, y, wide, tall = place.get_position().bounds
+        whole = height + room
+        place.set_position((x, (y * height + room) / whole, wide, tall * height / whole))
