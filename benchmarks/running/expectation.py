@@ -33,7 +33,22 @@ SECONDS_PER_10000_FACES: dict[str, float] = {
 guess. It grows faster than the faces for some; a budget bounds it."""
 OTHERS = 3.0
 """The same of a method that is not listed."""
-WHOLE_BUDGET = frozenset({"parapoint", "fam", "nuvo", "foldingnet", "atlasnet", "nsm"})
+WHOLE_BUDGET = frozenset(
+    {
+        "parapoint",
+        "fam",
+        "nuvo",
+        "foldingnet",
+        "atlasnet",
+        "diffsr",
+        "elestruc",
+        "gtif",
+        "tearingnet",
+        "flattening_net",
+        "reggeonet",
+        "nsm",
+    }
+)
 """Methods that use all of their time budget, which is in seconds."""
 SECONDS_PER_ITERATION = 0.075
 """Processor time of an iteration of ParaPoint's training at 2,048 points, in seconds."""

@@ -333,7 +333,7 @@ PARAMETERS = {
     "automatic+slim": {"price": 1.0},
     "meshed": {"reconstruction": "poisson", "flattening": "slim"},
     "textured": {"pipeline": "computed", "texels": 2048},
-    "external": {"command": ""},
+    "external": {"command": "", "recipe": ""},
     "computed": {
         "points": 20_000,
         "distortion": "balanced",
