@@ -19,6 +19,8 @@ GROWTH = 0.3
 """Share by which a region may grow before its map is solved anew."""
 LEAST = 0.02
 """Share of a region that is given up together once it distorts the map too much."""
+HEADROOM = 0.7
+"""Share of the bound to which a region grows; smoothing its border may take the rest."""
 FIRST = 12
 """Triangles of the first region, whose map is taken as it is."""
 
@@ -64,7 +66,7 @@ class DAWand:
             last = len(surface.faces) - 1
             raise InputError(f"triangle must be a face, 0 to {last}, not {self.triangle}")
         region = Region(surface, self.triangle)
-        solves = grown(region, self.distortion)
+        solves = grown(region, HEADROOM * self.distortion)
         before = region.faces()
         smoothed = Region(surface, self.triangle, before)
         smoothed.smooth()

@@ -11,8 +11,10 @@ from parapoint.errors import InputError
 from parapoint.planar.domains import Domain, domain, far_pair, frames, scaled, singular_values
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, flat_faces
 
-PASSES = 4
+PASSES = 12
 """Times that the border is smoothed."""
+MAJORITY = 0.5
+"""Share of the faces around a face that decides whether it is inside."""
 STEPS = 10
 """Local/global steps of each map."""
 
@@ -38,6 +40,9 @@ class Region:
             raise InputError(f"triangle {seed} has no area: take another one as the seed")
         self.inside = np.zeros(len(mesh.faces), dtype=bool)
         self.uses = np.zeros(len(mesh.vertices), dtype=np.int64)
+        self.valence = np.bincount(mesh.faces.reshape(-1), minlength=len(mesh.vertices))
+        self.rim = np.zeros(len(mesh.vertices), dtype=bool)
+        self.rim[mesh.halfedges[self.beside.reshape(-1) < 0]] = True
         self.add(seed)
         for face in faces:
             if face != seed:
@@ -71,24 +76,26 @@ class Region:
             return bool(self.uses[opposite] == 0)
         return sum(shared) == 2
 
-    def is_ear(self, face: int) -> bool:
-        """Whether a face can be left out, two of its neighbours are outside, one is not."""
+    def may_leave(self, face: int) -> bool:
+        """Whether the region without a face is a disk: it bares at most one vertex."""
         if not self.inside[face] or face == self.seed:
             return False
         shared = self.shared(face)
-        if sum(shared) != 1 or (self.beside[face] < 0).any():
-            return False
-        return bool(self.uses[self.corners[face][(shared.index(True) + 2) % 3]] == 1)
+        if sum(shared) != 2:
+            return sum(shared) == 1
+        apex = self.corners[face][(shared.index(False) + 2) % 3]
+        return bool(self.uses[apex] == self.valence[apex] and not self.rim[apex])
 
     def smooth(self) -> None:
-        """Take in faces with two neighbours inside, leave out those with two outside."""
+        """Let the faces around decide: take in where most are inside, leave out where few are."""
         for _ in range(PASSES):
-            near = np.unique(self.beside[self.inside])
-            for face in near[near >= 0].tolist():
-                if self.fits(face) and sum(self.shared(face)) == 2:
+            around = self.uses / np.maximum(self.valence, 1)
+            votes = around[self.mesh.faces].mean(axis=1)
+            for face in np.flatnonzero(~self.inside & (votes > MAJORITY)).tolist():
+                if self.fits(face):
                     self.add(face)
-            for face in self.faces().tolist():
-                if self.is_ear(face):
+            for face in np.flatnonzero(self.inside & (votes < MAJORITY)).tolist():
+                if self.may_leave(face):
                     self.drop(face)
 
 

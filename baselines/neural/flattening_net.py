@@ -10,7 +10,7 @@ from baselines.neural.point_grid import arranged, blocks, squared_distances
 from parapoint.surfaces.parameterization import TracePoint
 from parapoint.surfaces.surface import FloatArray, IntArray
 
-BLOCK = 32
+BLOCK = 16
 """Cells on a side of a block, at most, in which points are assigned one to one: the time of an
 assignment grows with the cube of their number."""
 
