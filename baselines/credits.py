@@ -65,6 +65,12 @@ CREDITS = {
     "fam": Credit(OURS, ("zhang2024fam",)),
     "foldingnet": Credit(OURS, ("yang2018",)),
     "atlasnet": Credit(OURS, ("groueix2018",)),
+    "diffsr": Credit(OURS, ("bednarik2020",)),
+    "elestruc": Credit(OURS, ("deprelle2019",)),
+    "gtif": Credit(OURS, ("chen2020",)),
+    "tearingnet": Credit(OURS, ("pang2021",)),
+    "flattening_net": Credit(OURS, ("zhang2023flattening",)),
+    "reggeonet": Credit(OURS, ("zhang2022reggeonet",)),
     "nuvo": Credit(OURS, ("srinivasan2023",)),
     "nsm": Credit(LIBIGL, ("morreale2021", "rabinovich2017", "libigl")),
 }

@@ -3,30 +3,26 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import ClassVar
 
-import igl
 import numpy as np
 
+from baselines.disk_regions import Region, distortion, flattened
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
 from parapoint.parameters import check_number, check_whole
-from parapoint.planar.domains import Domain, domain, far_pair, frames, scaled, singular_values
 from parapoint.surfaces.parameterization import Parameterization
-from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, Surface, flat_faces
+from parapoint.surfaces.surface import FloatArray, Mesh, Surface
 
 GROWTH = 0.3
 """Share by which a region may grow before its map is solved anew."""
 LEAST = 0.02
 """Share of a region that is given up together once it distorts the map too much."""
+HEADROOM = 0.7
+"""Share of the bound to which a region grows; smoothing its border may take the rest."""
 FIRST = 12
 """Triangles of the first region, whose map is taken as it is."""
-STEPS = 10
-"""Local/global steps of each map."""
-PASSES = 4
-"""Times that the border is smoothed."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +66,7 @@ class DAWand:
             last = len(surface.faces) - 1
             raise InputError(f"triangle must be a face, 0 to {last}, not {self.triangle}")
         region = Region(surface, self.triangle)
-        solves = grown(region, self.distortion)
+        solves = grown(region, HEADROOM * self.distortion)
         before = region.faces()
         smoothed = Region(surface, self.triangle, before)
         smoothed.smooth()
@@ -91,97 +87,6 @@ class DAWand:
         rows, corners = np.unique(corners, return_inverse=True)
         both = np.concatenate([uv, np.full((size, 2), np.nan)])
         return Parameterization(both[rows], corners.reshape(-1, 3), report=report)
-
-
-class Region:
-    """A set of faces that is a disk: faces are added and taken away where it stays one.
-
-    Args:
-        mesh: any mesh; faces without area stay outside.
-        seed: a face of the region that never leaves it.
-        faces: rows of the region; the seed alone by default.
-
-    Raises:
-        InputError: the seed has no area.
-    """
-
-    def __init__(self, mesh: Mesh, seed: int, faces: Iterable[int] = ()) -> None:
-        self.mesh, self.seed = mesh, seed
-        self.corners: list[list[int]] = mesh.faces.tolist()
-        self.beside = neighbours(mesh)
-        self.blocked = flat_faces(mesh.vertices, mesh.faces)
-        if self.blocked[seed]:
-            raise InputError(f"triangle {seed} has no area: take another one as the seed")
-        self.inside = np.zeros(len(mesh.faces), dtype=bool)
-        self.uses = np.zeros(len(mesh.vertices), dtype=np.int64)
-        self.add(seed)
-        for face in faces:
-            if face != seed:
-                self.add(face)
-
-    def faces(self) -> IntArray:
-        """The rows of its faces."""
-        return np.flatnonzero(self.inside)
-
-    def add(self, face: int) -> None:
-        """Take a face in."""
-        self.inside[face] = True
-        self.uses[self.corners[face]] += 1
-
-    def drop(self, face: int) -> None:
-        """Leave a face out."""
-        self.inside[face] = False
-        self.uses[self.corners[face]] -= 1
-
-    def shared(self, face: int) -> list[bool]:
-        """For each edge of a face, from corner k to k + 1, whether the region lies across it."""
-        return [other >= 0 and bool(self.inside[other]) for other in self.beside[face]]
-
-    def fits(self, face: int) -> bool:
-        """Whether the region with a face is a disk: it meets it along one piece of the border."""
-        if self.inside[face] or self.blocked[face]:
-            return False
-        shared = self.shared(face)
-        if sum(shared) == 1:
-            opposite = self.corners[face][(shared.index(True) + 2) % 3]
-            return bool(self.uses[opposite] == 0)
-        return sum(shared) == 2
-
-    def is_ear(self, face: int) -> bool:
-        """Whether a face can be left out, two of its neighbours are outside, one is not."""
-        if not self.inside[face] or face == self.seed:
-            return False
-        shared = self.shared(face)
-        if sum(shared) != 1 or (self.beside[face] < 0).any():
-            return False
-        return bool(self.uses[self.corners[face][(shared.index(True) + 2) % 3]] == 1)
-
-    def smooth(self) -> None:
-        """Take in faces with two neighbours inside, leave out those with two outside."""
-        for _ in range(PASSES):
-            near = np.unique(self.beside[self.inside])
-            for face in near[near >= 0].tolist():
-                if self.fits(face) and sum(self.shared(face)) == 2:
-                    self.add(face)
-            for face in self.faces().tolist():
-                if self.is_ear(face):
-                    self.drop(face)
-
-
-def neighbours(mesh: Mesh) -> IntArray:
-    """(F, 3) the face across each edge, from corner k to k + 1; -1 where there is not just one.
-
-    A neighbour that turns the other way counts as none.
-    """
-    order = np.argsort(mesh.edge_of_halfedge, kind="stable")
-    count = mesh.edge_face_count
-    first = (np.cumsum(count) - count)[count == 2]
-    one, other = order[first], order[first + 1]
-    turned = mesh.halfedges[one, 0] == mesh.halfedges[other, 1]
-    beside = np.full(3 * len(mesh.faces), -1)
-    beside[one[turned]] = other[turned] // 3
-    beside[other[turned]] = one[turned] // 3
-    return beside.reshape(-1, 3)
 
 
 def grown(region: Region, bound: float) -> int:
@@ -232,35 +137,3 @@ def grown(region: Region, bound: float) -> int:
         for face in region.faces().tolist():
             reach(face)
     return solves
-
-
-def distortion(mesh: Mesh, faces: IntArray) -> float:
-    """The mean distortion of the map of a region over its area."""
-    return float(np.average(flattened(mesh, faces)[1], weights=mesh.face_areas[faces]))
-
-
-def flattened(mesh: Mesh, faces: IntArray) -> tuple[FloatArray, FloatArray]:
-    """(V, 2) the map of a disk of some faces, 0 elsewhere; (n,) the distortion of each.
-
-    Raises:
-        FlatteningError: the map is not finite.
-    """
-    used, corners = np.unique(mesh.faces[faces], return_inverse=True)
-    disk = domain(Mesh(mesh.vertices[used], corners.reshape(-1, 3)))
-    rows = rigid(disk)
-    s1, s2 = singular_values(frames(disk), rows, disk.faces)
-    uv = np.zeros((len(mesh.vertices), 2))
-    uv[used] = rows
-    return uv, (s1 - 1) ** 2 + (s2 - 1) ** 2
-
-
-def rigid(disk: Domain) -> FloatArray:
-    """(V, 2) the as-rigid-as-possible map that begins with the least-squares conformal one."""
-    pins = disk.loop[list(far_pair(disk.vertices[disk.loop]))]
-    uv, _ = igl.lscm(disk.vertices, disk.faces, pins, np.array([[0.0, 0.0], [1.0, 0.0]]))
-    uv = scaled(disk, uv)
-    held = disk.loop[:1]
-    solver = igl.ARAPData()
-    igl.arap_precomputation(disk.vertices, disk.faces, 2, held.astype(np.int32), solver)
-    solver.max_iter = STEPS
-    return np.asarray(igl.arap_solve(uv[held], solver, uv), dtype=np.float64)

@@ -65,6 +65,12 @@ METHODS: dict[str, str] = {
     "fam": "baselines.neural.fam:FAM",
     "foldingnet": "baselines.neural.foldingnet:FoldingNet",
     "atlasnet": "baselines.neural.atlasnet:AtlasNet",
+    "diffsr": "baselines.neural.diffsr:DiffSR",
+    "elestruc": "baselines.neural.elestruc:EleStruc",
+    "gtif": "baselines.neural.gtif:GTIF",
+    "tearingnet": "baselines.neural.tearingnet:TearingNet",
+    "flattening_net": "baselines.neural.flattening_net:FlatteningNet",
+    "reggeonet": "baselines.neural.reggeonet:RegGeoNet",
     "nuvo": "baselines.neural.nuvo:Nuvo",
     "nsm": "baselines.neural.nsm:NSM",
 }

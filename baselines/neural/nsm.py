@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -15,12 +15,17 @@ from parapoint.planar.growth import PRICE, Need, grown
 from parapoint.surfaces.parameterization import Parameterization, TracePoint
 from parapoint.surfaces.surface import Mesh, Surface
 
+if TYPE_CHECKING:
+    from baselines.neural.stepping import Terms
+
 FLATTENING_SHARE = 0.5
 """Share of a time budget that the map to be fitted takes at most."""
 REFINEMENT_SHARE = 0.15
 """Share of the steps, and of what is left of the time budget, that the refinement takes."""
 EXTENT = 8.0
 """Longest side of the flattened mesh as the networks see it; with 2 they learn slower."""
+REFINED_AT = 20_000
+"""Samples at most at which the distortion is lowered."""
 CHECKED = 4_000
 """Fresh places at which the report measures the networks."""
 
@@ -44,11 +49,11 @@ class NSM(NeuralMethod):
         points: samples of the triangles.
         iterations: steps of both trainings together.
         subset: samples of a step.
-        time_budget: seconds of processor time, the flattening among them.
+        time_budget: seconds of work, that of the flattening among them.
     """
 
     points: int = 100_000
-    iterations: int = 10_000
+    iterations: int = 20_000
     subset: int = 256
 
     requires: ClassVar[frozenset[str]] = frozenset({"faces", "disk_after_cut"})
@@ -69,7 +74,9 @@ class NSM(NeuralMethod):
         """
         import torch
 
-        from baselines.neural import nsm_networks as of
+        from baselines.neural import nsm_training as of
+        from baselines.neural.nsm_networks import Refinement, SurfaceMap
+        from baselines.neural.stepping import trained
 
         if not isinstance(surface, Mesh):
             raise UnsupportedError("needs faces; the surface is a point cloud")
@@ -81,34 +88,36 @@ class NSM(NeuralMethod):
         solid = (flat.mesh.vertices - flat.mesh.vertices.mean(axis=0)) / unit
         triangles = of.Triangles(*(torch.as_tensor(at[corners]) for at in (inside, solid)))
         generator = torch.Generator().manual_seed(seed)
-        fitted, refined = of.SurfaceMap(generator), of.Refinement(generator)
+        fitted, refined = SurfaceMap(generator), Refinement(generator)
         samples = triangles.drawn(self.points, generator)
 
-        def chosen() -> torch.Tensor:
-            return torch.randint(self.points, (self.subset,), generator=generator)
+        def chosen(among: int) -> torch.Tensor:
+            return torch.randint(among, (self.subset,), generator=generator)
 
         trace: list[TracePoint] = []
 
-        def train(network: torch.nn.Module, terms: of.Terms, rate: float, end: float) -> None:
+        def train(network: torch.nn.Module, terms: Terms, rate: float, end: float) -> None:
             steps = round(end * self.iterations) - len(trace)
             left = None
             if self.time_budget is not None:
                 spent = clock.worked() - began
                 left = (self.time_budget - spent) * (end if network is fitted else 1.0)
-            for losses in of.trained(network, terms, rate, steps, left):
+            for losses in trained(network, terms, rate, steps, left):
                 trace.append(TracePoint(len(trace) + 1, clock.worked() - began, losses))
 
-        at_fit, at_refinement = of.RATES
-        first = 1 - REFINEMENT_SHARE
-        train(fitted, lambda: of.overfit_terms(fitted, samples.rows(chosen())), at_fit, first)
+        def overfit() -> dict[str, torch.Tensor]:
+            return of.overfit_terms(fitted, samples.rows(chosen(self.points)))
+
+        train(fitted, overfit, of.RATES[0], 1 - REFINEMENT_SHARE)
         steps_of_fit = len(trace)
-        forms = of.first_forms(fitted, samples.uv)
+        refined_at = samples.uv[:REFINED_AT]
+        forms = of.first_forms(fitted, refined_at)
 
         def distortion() -> dict[str, torch.Tensor]:
-            rows = chosen()
-            return of.distortion_terms(refined, samples.uv[rows], forms[rows])
+            rows = chosen(len(forms))
+            return of.distortion_terms(refined, refined_at[rows], forms[rows])
 
-        train(refined, distortion, at_refinement, 1.0)
+        train(refined, distortion, of.RATES[1], 1.0)
         with torch.no_grad():
             moved = refined(torch.as_tensor(inside, dtype=torch.float32)[None])[0]
             checked = of.figures(fitted, refined, triangles.drawn(CHECKED, generator))

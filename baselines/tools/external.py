@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import subprocess
 from dataclasses import dataclass
@@ -11,7 +12,9 @@ from tempfile import TemporaryDirectory
 from typing import ClassVar
 
 import numpy as np
+from scipy.spatial import cKDTree
 
+from baselines.tools.recipes import RECIPES, Recipe
 from parapoint.errors import InputError
 from parapoint.files.reading import read_parameterized
 from parapoint.method import MissingError, UnsupportedError
@@ -19,24 +22,37 @@ from parapoint.planar.domains import FlatteningError
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh, Surface
 
+ROUNDED = 1e-4
+"""Distance, in extents of the surface, by which programs that print few digits move vertices."""
+
 
 @dataclass(frozen=True)
 class External:
     """An external program: reads an OBJ, writes the same faces with vt.
 
-    The program is started without a shell. It must keep the order of the faces and of their
-    corners. A program that takes disks only must say so by its exit status.
+    The program is started without a shell. It may put the faces and their corners in another order
+    and repeat vertices, but must not move them. A program that takes disks only must say so by its
+    exit status.
 
     Attributes:
         command: template such as "mytool --in {input} --out {output}", split as a shell would.
+        recipe: in place of a command, the name of a known program: see `baselines.tools.recipes`.
     """
 
     command: str = ""
+    recipe: str = ""
 
     requires: ClassVar[frozenset[str]] = frozenset({"faces"})
     deterministic: ClassVar[bool] = False  # a program makes no promise
 
     def __post_init__(self) -> None:
+        if self.recipe:
+            if self.command:
+                raise InputError("external takes a command or a recipe, not both")
+            if self.recipe not in RECIPES:
+                known = ", ".join(RECIPES)
+                raise InputError(f"there is no recipe {self.recipe!r}; there are: {known}")
+            return
         for place in ("{input}", "{output}"):
             if place not in self.command:
                 raise InputError(
@@ -54,37 +70,70 @@ class External:
         """
         if not isinstance(surface, Mesh):
             raise UnsupportedError("needs faces; the surface is a point cloud")
-        words = shlex.split(self.command)
+        recipe = RECIPES[self.recipe] if self.recipe else Recipe(self.command, "", "")
+        words = shlex.split(recipe.command)
         if which(words[0]) is None:
-            raise MissingError(f"needs the program {words[0]}, which is not installed")
-        with TemporaryDirectory() as folder:
-            source, target = Path(folder, "input.obj"), Path(folder, "output.obj")
+            how = f": {recipe.source}" if recipe.source else ", which is not installed"
+            raise MissingError(f"needs the program {words[0]}{how}")
+        start = os.environ.get(recipe.home) if recipe.home else None
+        if recipe.home and not (start and Path(start, words[1]).is_file()):
+            raise MissingError(f"needs {words[1]}: {recipe.source}")
+        with TemporaryDirectory() as name:
+            folder = Path(name, "folder")
+            folder.mkdir()
+            source, target = Path(name, "input.obj"), Path(name, "output.obj")
             write_bare_obj(source, surface)
-            places = {"{input}": str(source), "{output}": str(target)}
+            places = {"{input}": source, "{output}": target, "{folder}": folder}
             for place, path in places.items():
-                words = [word.replace(place, path) for word in words]
-            ended = subprocess.run(words, capture_output=True, text=True, check=False)  # noqa: S603 (the user's own command)
+                words = [word.replace(place, str(path)) for word in words]
+            if self.recipe and start is None:
+                start = str(folder)
+            ended = subprocess.run(words, capture_output=True, text=True, check=False, cwd=start)  # noqa: S603 (the user's own command)
             if ended.returncode:
                 said = (ended.stderr.strip() or ended.stdout.strip()).splitlines()[-1:]
                 raise FlatteningError(
                     f"{words[0]} ended with status {ended.returncode}: {''.join(said)}"
                 )
+            if recipe.result:
+                target = next(folder.glob(recipe.result), folder / recipe.result)
             try:
                 mesh, result = read_parameterized(target)
             except InputError as error:
                 raise FlatteningError(f"{words[0]} wrote no UV map: {error}") from None
-        same = mesh.faces.shape == surface.faces.shape and np.allclose(
-            mesh.vertices[mesh.faces],
-            surface.vertices[surface.faces],
-            rtol=0,
-            atol=1e-4
-            * np.ptp(
-                surface.vertices[surface.referenced], axis=0
-            ).max(),  # programs print few digits
-        )
-        if not same:
-            raise FlatteningError(f"{words[0]} changed the faces or their order")
-        return result
+        found = in_order(mesh, result, surface)
+        if found is None:
+            raise FlatteningError(f"{words[0]} changed the faces")
+        return found
+
+
+def in_order(mesh: Mesh, made: Parameterization, surface: Mesh) -> Parameterization | None:
+    """A map of a mesh, its faces and corners in the order of a surface that is the same.
+
+    Args:
+        mesh: the surface's faces in any order, its vertices renumbered or repeated and rounded.
+        made: the map of the mesh.
+        surface: the surface.
+
+    Returns:
+        None where the mesh has other faces, or a vertex is ROUNDED away from the surface's.
+    """
+    if mesh.faces.shape != surface.faces.shape:
+        return None
+    reach = ROUNDED * np.ptp(surface.vertices[surface.referenced], axis=0).max()
+    apart = mesh.vertices[mesh.faces] - surface.vertices[surface.faces]
+    if np.abs(apart).max() <= reach:
+        return made
+    places, number = np.unique(surface.vertices, axis=0, return_inverse=True)
+    away, nearest = cKDTree(places).query(mesh.vertices[mesh.faces])
+    wanted, found = number.reshape(-1)[surface.faces], np.asarray(nearest)
+    rows, faces = (np.lexsort(np.sort(of, axis=1).T) for of in (wanted, found))
+    if away.max() > reach or (np.sort(wanted[rows]) != np.sort(found[faces])).any():
+        return None
+    face = np.empty_like(faces)
+    face[rows] = faces
+    corner = (found[face][:, None, :] == wanted[:, :, None]).argmax(axis=2)
+    rows_of_uv = np.take_along_axis(made.corners[face], corner, axis=1)
+    return Parameterization(made.uv, rows_of_uv, made.trace, made.report)
 
 
 def write_bare_obj(path: Path, mesh: Mesh) -> None:

@@ -55,7 +55,20 @@ CASES = ("half_cylinder", "saddle@noise=0")
 """A mesh and a cloud, so that every method has a surface that it can take."""
 BUDGETS = {
     **dict.fromkeys(
-        ("parapoint", "fam", "nuvo", "foldingnet", "atlasnet", "nsm"),
+        (
+            "parapoint",
+            "fam",
+            "nuvo",
+            "foldingnet",
+            "atlasnet",
+            "diffsr",
+            "elestruc",
+            "gtif",
+            "tearingnet",
+            "flattening_net",
+            "reggeonet",
+            "nsm",
+        ),
         "points=120, subset=100, iterations=2",
     ),
     "computed": "points=500",

@@ -70,7 +70,7 @@ class Display(Progress):
         self._task = self._bar.add_task("", left="")
         self._running: dict[str, tuple[str, float]] = {}
         self._left: dict[str, float] = {}
-        self._done: list[float] = []
+        self._done: list[tuple[float, float]] = []
         self._total, self._jobs = 0, 1
         self._began = self._said = time.monotonic()
 
@@ -111,8 +111,9 @@ class Display(Progress):
 
     def ended(self, cell: Cell, row: ResultRow) -> None:
         """Count a cell as done; on a terminal, say so only if its method failed."""
-        self._running.pop(row.id, None)
-        self._done.append(self._left.pop(row.id, 0.0))
+        now = time.monotonic()
+        _, began = self._running.pop(row.id, ("", now))
+        self._done.append((self._left.pop(row.id, 0.0), now - began))
         self._bar.advance(self._task)
         said = f"{_name(cell)}: {ending(row)}"
         if self._bar.disable:
@@ -150,8 +151,9 @@ class Display(Progress):
 
     def _rest(self) -> str:
         """How long the cells that have not ended take, about."""
-        elapsed = time.monotonic() - self._began
-        seconds = remaining(self._done, self._left.values(), elapsed, self._jobs)
+        now, left = time.monotonic(), dict(self._left)
+        running = [(left.pop(row, 0.0), now - began) for row, (_, began) in self._running.items()]
+        seconds = remaining(self._done, running, [*left.values()], self._jobs)
         return f"{about(seconds)} left" if self._left else ""
 
 

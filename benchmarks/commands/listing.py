@@ -37,7 +37,7 @@ def _parameters(spec: str) -> tuple[str, Mapping[str, object]]:
 def suites() -> Table:
     """Each suite with its cases and methods, and how long it takes on one core, about."""
     from benchmarks.cases.suites import SUITES
-    from benchmarks.running.expectation import about, expectation
+    from benchmarks.running.expectation import about, expectation, size
 
     table = _table("suite", "title", "cells", "one core", "download", "cases", "methods", "seeds")
     for suite in SUITES.values():
@@ -48,7 +48,7 @@ def suites() -> Table:
             suite.title,
             str(needs.cells),
             about(needs.seconds),
-            f"{needs.megabytes:.0f} MB",
+            size(needs.megabytes),
             ", ".join(suite.cases),
             ", ".join(suite.methods),
             ", ".join(map(str, suite.seeds)),

@@ -5,7 +5,7 @@ Nothing but words on a screen depends on it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from benchmarks.cases import models
@@ -33,12 +33,29 @@ SECONDS_PER_10000_FACES: dict[str, float] = {
 guess. It grows faster than the faces for some; a budget bounds it."""
 OTHERS = 3.0
 """The same of a method that is not listed."""
-WHOLE_BUDGET = frozenset({"parapoint", "fam", "nuvo", "foldingnet", "atlasnet", "nsm"})
+WHOLE_BUDGET = frozenset(
+    {
+        "parapoint",
+        "fam",
+        "nuvo",
+        "foldingnet",
+        "atlasnet",
+        "diffsr",
+        "elestruc",
+        "gtif",
+        "tearingnet",
+        "flattening_net",
+        "reggeonet",
+        "nsm",
+    }
+)
 """Methods that use all of their time budget, which is in seconds."""
 SECONDS_PER_ITERATION = 0.075
 """Processor time of an iteration of ParaPoint's training at 2,048 points, in seconds."""
 OVERHEAD = 0.7
 """Wall time in seconds that the metrics and the process of a cell take beside its method."""
+TRUST = 0.1
+"""Share of a run that counts, for its pace, as if it had taken the time that was expected."""
 USUAL_FACES = 10_000
 """Number of faces that a surface counts for whose size is not known before it is read."""
 
@@ -103,21 +120,34 @@ def _model(case: str) -> models.Model | None:
     return models.registry().get(case.partition("@")[0])
 
 
-def remaining(done: Iterable[float], left: Iterable[float], elapsed: float, jobs: int) -> float:
+def remaining(
+    done: Sequence[tuple[float, float]],
+    running: Sequence[tuple[float, float]],
+    waiting: Sequence[float],
+    jobs: int,
+) -> float:
     """Wall time in seconds that the rest of a run takes, about.
 
-    Before the first cell ends, expectations tell. Later they are scaled by how long the cells that
-    are done have taken against what was expected of them.
+    Expectations are scaled by how long the cells that are done have taken against what was expected
+    of them. To begin with they are trusted, such that one slow cell does not upset the whole.
 
     Args:
-        done: what was expected of each cell that is done (`cell_seconds`).
-        left: what is expected of each other cell.
-        elapsed: wall time in seconds of the run so far.
+        done: of each cell that is done, what was expected of it (`cell_seconds`) and what it took.
+        running: of each cell that runs, what is expected of it and how long it has been running.
+        waiting: what is expected of each other cell.
         jobs: how many cells run at a time.
     """
-    expected = sum(done)
-    pace = elapsed / expected if expected else 1 / jobs
-    return sum(left) * pace
+    trusted = TRUST * (sum(whole for whole, _ in (*done, *running)) + sum(waiting))
+    expected = trusted + sum(whole for whole, _ in done)
+    pace = (trusted + sum(took for _, took in done)) / expected if expected else 1.0
+    left = [max(pace * whole - so_far, 0.0) for whole, so_far in running]
+    left += [pace * whole for whole in waiting]
+    return max(sum(left) / jobs, max(left, default=0.0))
+
+
+def size(megabytes: float) -> str:
+    """The size of a download in whole megabytes."""
+    return "< 1 MB" if 0 < megabytes < 1 else f"{megabytes:.0f} MB"
 
 
 def clock(seconds: float) -> str:

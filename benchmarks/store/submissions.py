@@ -94,7 +94,8 @@ def read(folder: Path, method: str, suite: Suite) -> Submission:
     """
     name = named(method)
     if not folder.is_dir():
-        raise InputError(f"{folder}: no such folder; a submission is a folder of OBJ files")
+        fault = "is no folder" if folder.exists() else "no such folder"
+        raise InputError(f"{folder}: {fault}; a submission is a folder of OBJ files")
     files = {path.stem: path for path in sorted(folder.iterdir()) if path.suffix.lower() == ENDING}
     faults = [
         f"{files[stem].name}: no case of {suite.name}" for stem in files.keys() - {*suite.cases}

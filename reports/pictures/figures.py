@@ -234,8 +234,8 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
             "seams",
             "Energy against seams",
             "Symmetric Dirichlet energy (4 for an isometry; 20 stands for all above) against the "
-            "length of the seam over the root of the area. Hollow: many charts; pale: broken or "
-            "collapsed. A longer seam buys less distortion.",
+            "length of the seam over the root of the area, of each model that some map cuts. "
+            "Hollow: many charts; pale: broken or collapsed. A longer seam buys less distortion.",
             make=partial(seams, contents),
             cases=meshes,
             size=PANELS,

@@ -213,8 +213,9 @@ def _mark(place: Axes, contents: Contents, points: pd.DataFrame, x: str, y: str)
 
 
 def seams(contents: Contents, cases: Sequence[str]) -> Figure | None:
-    """Symmetric Dirichlet energy against the length of the seam, model by model."""
-    shown = {case: points for case in cases if len(points := prices(contents, case))}
+    """Symmetric Dirichlet energy against the seam's length, of each model that some map cuts."""
+    priced = {case: prices(contents, case) for case in cases}
+    shown = {case: points for case, points in priced.items() if (points[SEAM] > 0).any()}
     if not shown:
         return None
     made, places = small_multiples(len(shown))

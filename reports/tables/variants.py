@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from benchmarks.cases.derived import is_drawn
 from parapoint.surfaces.preparation import CUT
 from reports.contents import (
     ANGLE,
@@ -111,4 +112,6 @@ def _cut(record: Mapping[str, object]) -> str:
         return "learned"
     if CUT in str(record["preprocessing"]):
         return "automatic"
+    if is_drawn(str(record["case"])):
+        return "drawn"
     return "its own" if (number(record, "seam_length") or 0) > 0 else "none"

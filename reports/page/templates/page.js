@@ -109,17 +109,18 @@
       return { text: `${(100 * found.mean).toFixed(1)} %`, value: found.mean, small: found.half === null ? "" : `± ${(100 * found.half).toFixed(1)}` };
     };
     const order = [...methods].sort((a, b) => (a.charts === "many") - (b.charts === "many") || (won.get(b.at)?.mean ?? -1) - (won.get(a.at)?.mean ?? -1));
+    const hasBad = methods.some(({ bad }) => bad);
     const rows = order.map((method) => [
       { text: method.name, title: method.detail, words: true, small: method.detail },
       share(method),
       { text: method.ok, value: method.share },
-      { text: method.bad, title: method.reasons, mark: method.bad ? "bad" : "", words: true },
+      ...(hasBad ? [{ text: method.bad, title: method.reasons, mark: method.bad ? "bad" : "", words: true }] : []),
       ...metrics().map((metric) => ranked(all[method.at][metric.at])),
     ]);
     const word = { mean: "Mean", median: "Median", worst: "Worst" }[form.statistic.value];
     said.textContent = over === "own" ? `${word} over each method's own models: not the same ones for all.`
       : `${word} over the ${suite().common} of ${suite().models.length} models on which all methods gave a map and the metric is defined.`;
-    return { heads: [{ text: "Method", words: true }, { text: "pairs won", title: "share of the pairs with other methods shown that are won, by " + form.weights.value + ", validity first" }, { text: "ok" }, { text: "not ok", words: true }, ...metrics().map(heading)], rows };
+    return { heads: [{ text: "Method", words: true }, { text: "pairs won", title: "share of the pairs with other methods shown that are won, by " + form.weights.value + ", validity first" }, { text: "ok" }, ...(hasBad ? [{ text: "not ok", words: true }] : []), ...metrics().map(heading)], rows };
   }
 
   function byModel({ methods, models }) {

@@ -6,16 +6,14 @@ import torch
 
 from baselines.hybrid import AutomaticSLIM
 from baselines.neural.nsm import NSM
-from baselines.neural.nsm_networks import (
-    Refinement,
-    SurfaceMap,
+from baselines.neural.nsm_networks import Refinement, SurfaceMap, with_axes
+from baselines.neural.nsm_training import (
     Triangles,
     distortion_terms,
     first_forms,
     overfit_terms,
-    trained,
-    with_axes,
 )
+from baselines.neural.stepping import trained
 from parapoint.errors import InputError
 from parapoint.surfaces.surface import PointCloud
 from parapoint.testing import irregular_disk

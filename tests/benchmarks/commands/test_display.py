@@ -80,9 +80,17 @@ def test_on_a_terminal_the_bar_fits_80_columns_with_count_and_times(clock, monke
     assert capsys.readouterr().err == ""
 
 
-def test_the_rest_is_judged_by_the_pace_so_far():
-    assert expectation.remaining([], [10.0, 20.0], 0.0, 2) == 15
-    assert expectation.remaining([10.0], [10.0, 20.0], 40.0, 2) == 120
+def test_the_size_of_a_download_is_none_only_where_nothing_is():
+    assert [expectation.size(mb) for mb in (0, 0.2, 0.9, 1.4, 30)] == [
+        "0 MB",
+        "< 1 MB",
+        "< 1 MB",
+        "1 MB",
+        "30 MB",
+    ]
+
+
+def test_times_are_said_in_round_numbers():
     assert expectation.clock(3725.4) == "1:02:05"
     assert [expectation.about(s) for s in (3, 44, 100, 7000)] == ["10 s", "40 s", "2 min", "1.9 h"]
 

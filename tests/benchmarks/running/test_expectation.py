@@ -55,8 +55,26 @@ def test_a_suite_needs_all_its_cells_and_each_model_once(monkeypatch):
 
 
 def test_what_remains_is_scaled_by_what_was_done():
-    assert remaining([], [2, 4], 100.0, 3) == pytest.approx(2)
-    assert remaining([1, 1], [2, 4], 6.0, 3) == pytest.approx(18)
+    # All of 12 s is expected, of which 1.2 count as kept: a pace of (6 + 1.2) / (2 + 1.2) = 2.25.
+    rest = remaining([(1, 3), (1, 3)], [(2, 1)], [4, 4], 2)
+    assert rest == pytest.approx((2 * 2.25 - 1 + 2 * 4 * 2.25) / 2)
+
+
+def test_before_a_cell_ends_the_expectation_is_kept():
+    assert remaining([], [], [2, 4, 6], 2) == pytest.approx(6)
+    assert remaining([], [(8, 3)], [2], 1) == pytest.approx(7)
+    assert remaining([], [(2, 3)], [], 1) == 0
+    assert remaining([], [], [], 1) == 0
+
+
+def test_a_run_lasts_as_long_as_its_longest_cell():
+    assert remaining([], [(9, 1)], [2], 4) == pytest.approx(8)
+
+
+def test_one_slow_cell_does_not_upset_the_rest():
+    """One of sixty cells that takes ten times as long as expected: the rest grows by half at most,
+    and not tenfold."""
+    assert remaining([(3, 30)], [], [10] * 59, 1) < 1.5 * 590
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,135 @@
+"""Samples and losses of Neural Surface Maps (`baselines.neural.nsm`)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from torch import Tensor, nn
+
+from baselines.neural.nsm_networks import Refinement, SurfaceMap, jacobians, with_axes
+
+RATES = (1e-2, 2e-3)
+"""Learning rates at the start, of the surface map and of the refining one; they fall to 0."""
+NORMAL_WEIGHT = 0.01
+"""Weight of the normals beside the positions, the paper's."""
+FLIP_WEIGHT = 100.0
+"""Weight of flips in the refinement."""
+EPSILON = 0.01
+"""The paper's ε, added to a first form before it is inverted."""
+TINY = 1e-6
+"""Added to squared determinants of the refinement."""
+
+
+class Samples(NamedTuple):
+    """Places on triangles that lie both in the plane and in space.
+
+    Attributes:
+        uv: (N, 2) in the plane.
+        points: (N, 3) the same in space.
+        normals: (N, 3) of the triangles, unit.
+        jacobians: (N, 3, 2) of the map from the plane to space.
+    """
+
+    uv: Tensor
+    points: Tensor
+    normals: Tensor
+    jacobians: Tensor
+
+    def rows(self, chosen: Tensor) -> Samples:
+        """Some of them."""
+        return Samples(*(of[chosen] for of in self))
+
+
+class Triangles:
+    """The triangles of a flat mesh and those in space, to draw samples from.
+
+    Args:
+        flat: (F, 3, 2) corners in the plane, none flipped.
+        solid: (F, 3, 3) corners in space.
+    """
+
+    def __init__(self, flat: Tensor, solid: Tensor) -> None:
+        self.flat, self.solid = flat.float(), solid.float()
+        cross = torch.linalg.cross(solid[:, 1] - solid[:, 0], solid[:, 2] - solid[:, 0])
+        self.area = cross.norm(dim=1)
+        self.normals = (cross / self.area[:, None]).float()
+        edges = [(of[:, 1:] - of[:, :1]).mT for of in (flat, solid)]
+        self.jacobians = (edges[1] @ torch.linalg.inv(edges[0])).float()
+
+    def drawn(self, count: int, generator: torch.Generator) -> Samples:
+        """Places drawn evenly by area in space."""
+        face = torch.multinomial(self.area, count, replacement=True, generator=generator)
+        first, second = torch.rand(2, count, 1, generator=generator)
+        root = first.sqrt()
+        share = torch.stack([1 - root, root * (1 - second), root * second], dim=1)
+        uv, points = ((share * of[face]).sum(1) for of in (self.flat, self.solid))
+        return Samples(uv, points, self.normals[face], self.jacobians[face])
+
+
+def overfit_terms(surface: SurfaceMap, at: Samples) -> dict[str, Tensor]:
+    """Squared distances of positions and of unit normals, means over the samples."""
+    made, along, across = surface(with_axes(at.uv))
+    normals = nn.functional.normalize(torch.linalg.cross(along, across), dim=1)
+    return {
+        "position": (made - at.points).square().sum(1).mean(),
+        "normal": NORMAL_WEIGHT * (normals - at.normals).square().sum(1).mean(),
+    }
+
+
+def first_forms(surface: SurfaceMap, uv: Tensor) -> Tensor:
+    """(N, 2, 2) the first fundamental form Jᵀ J of the neural surface at places (N, 2)."""
+    with torch.no_grad():
+        jacobian = jacobians(surface(with_axes(uv)))
+    return jacobian.mT @ jacobian
+
+
+def distortion_terms(refinement: Refinement, uv: Tensor, forms: Tensor) -> dict[str, Tensor]:
+    """The symmetric Dirichlet energy of f ∘ h⁻¹ and the flips of h, means over places (N, 2).
+
+    With J the Jacobian of h and I the first form of f, M = J⁻ᵀ I J⁻¹ is the first form of f ∘ h⁻¹.
+    The energy is tr M + tr M⁻¹, 4 for an isometry; ε is added to the I that is inverted, so that it
+    is 3.98 there.
+    """
+    J = jacobians(refinement(with_axes(uv)))
+    determinant = torch.linalg.det(J)
+    adjugate = adjugates(J)
+    there = adjugate.mT @ forms @ adjugate / (determinant.square() + TINY)[:, None, None]
+    safe = forms + EPSILON * torch.eye(2)
+    back = J @ adjugates(safe) @ J.mT / torch.linalg.det(safe)[:, None, None]
+    traces = (there + back).diagonal(dim1=1, dim2=2).sum(1)
+    return {
+        "distortion": traces.mean(),
+        "flip": FLIP_WEIGHT * (-determinant).clamp(min=0).mean(),
+    }
+
+
+def adjugates(matrices: Tensor) -> Tensor:
+    """(N, 2, 2) determinants times inverses."""
+    (a, b), (c, d) = matrices.permute(1, 2, 0)
+    return torch.stack([torch.stack([d, -b], dim=1), torch.stack([-c, a], dim=1)], dim=1)
+
+
+@torch.no_grad()
+def figures(surface: SurfaceMap, refinement: Refinement, at: Samples) -> dict[str, float]:
+    """How far the networks are from the triangles at some places, and how much they distort.
+
+    The root mean square distance; the median relative error of the derivatives, and its root mean
+    square; the distortion (see `distortion_terms`) before and after the refinement; and the share
+    of the places that the refinement flips.
+    """
+    pushed = surface(with_axes(at.uv))
+    apart = (jacobians(pushed) - at.jacobians).square().sum((1, 2))
+    apart = apart / at.jacobians.square().sum((1, 2))
+    forms = first_forms(surface, at.uv)
+    still = Refinement(torch.Generator())
+    before, after = (distortion_terms(of, at.uv, forms) for of in (still, refinement))
+    turned = torch.linalg.det(jacobians(refinement(with_axes(at.uv)))) <= 0
+    return {
+        "distance": (pushed[0] - at.points).square().sum(1).mean().sqrt().item(),
+        "derivative_error": apart.sqrt().median().item(),
+        "derivative_error_rms": apart.mean().sqrt().item(),
+        "distortion_before": before["distortion"].item(),
+        "distortion_after": after["distortion"].item(),
+        "flipped": turned.float().mean().item(),
+    }
