@@ -30,18 +30,8 @@ its fair area (see `benchmarks.metrics.usability`)."""
 
 FROM_POINTS = frozenset(
     {
-        *(
-            "parapoint",
-            "computed",
-            "meshed",
-            "textured",
-            "fam",
-            "nuvo",
-            "foldingnet",
-            "atlasnet",
-            "diffsr",
-        ),
-        *("elestruc", "gtif", "tearingnet", "flattening_net", "reggeonet"),
+        *("parapoint", "computed", "meshed", "textured", "fam", "nuvo", "foldingnet", "atlasnet"),
+        *("diffsr", "elestruc", "gtif", "tearingnet", "flattening_net", "reggeonet"),
     }
 )
 """Methods whose maps are made of points alone, so that a few flips at a face are forgiven."""
