@@ -24,6 +24,8 @@ REFINEMENT_SHARE = 0.15
 """Share of the steps, and of what is left of the time budget, that the refinement takes."""
 EXTENT = 8.0
 """Longest side of the flattened mesh as the networks see it; with 2 they learn slower."""
+REFINED_AT = 20_000
+"""Samples at most at which the distortion is lowered."""
 CHECKED = 4_000
 """Fresh places at which the report measures the networks."""
 
@@ -51,7 +53,7 @@ class NSM(NeuralMethod):
     """
 
     points: int = 100_000
-    iterations: int = 10_000
+    iterations: int = 20_000
     subset: int = 256
 
     requires: ClassVar[frozenset[str]] = frozenset({"faces", "disk_after_cut"})
@@ -89,8 +91,8 @@ class NSM(NeuralMethod):
         fitted, refined = SurfaceMap(generator), Refinement(generator)
         samples = triangles.drawn(self.points, generator)
 
-        def chosen() -> torch.Tensor:
-            return torch.randint(self.points, (self.subset,), generator=generator)
+        def chosen(among: int) -> torch.Tensor:
+            return torch.randint(among, (self.subset,), generator=generator)
 
         trace: list[TracePoint] = []
 
@@ -103,17 +105,19 @@ class NSM(NeuralMethod):
             for losses in trained(network, terms, rate, steps, left):
                 trace.append(TracePoint(len(trace) + 1, clock.worked() - began, losses))
 
-        at_fit, at_refinement = of.RATES
-        first = 1 - REFINEMENT_SHARE
-        train(fitted, lambda: of.overfit_terms(fitted, samples.rows(chosen())), at_fit, first)
+        def overfit() -> dict[str, torch.Tensor]:
+            return of.overfit_terms(fitted, samples.rows(chosen(self.points)))
+
+        train(fitted, overfit, of.RATES[0], 1 - REFINEMENT_SHARE)
         steps_of_fit = len(trace)
-        forms = of.first_forms(fitted, samples.uv)
+        refined_at = samples.uv[:REFINED_AT]
+        forms = of.first_forms(fitted, refined_at)
 
         def distortion() -> dict[str, torch.Tensor]:
-            rows = chosen()
-            return of.distortion_terms(refined, samples.uv[rows], forms[rows])
+            rows = chosen(len(forms))
+            return of.distortion_terms(refined, refined_at[rows], forms[rows])
 
-        train(refined, distortion, at_refinement, 1.0)
+        train(refined, distortion, of.RATES[1], 1.0)
         with torch.no_grad():
             moved = refined(torch.as_tensor(inside, dtype=torch.float32)[None])[0]
             checked = of.figures(fitted, refined, triangles.drawn(CHECKED, generator))

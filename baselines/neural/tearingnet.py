@@ -27,8 +27,9 @@ class TearingNet(SheetMethod):
     uv is the place in the grid as it was, not as T moved it: T may move two points to one place, a
     grid cannot. A cell that has lost an edge is torn, and has no points: the surface on both sides
     of a tear lies on both sides of the cell. What tears is decided by a threshold that has no
-    gradient, so that nothing asks for few tears, nor for tears where the surface is cut best. Left
-    out: the encoder, and the paper's training of F before T; T starts as no movement instead.
+    gradient, so that nothing asks for few tears, nor for tears where the surface is cut best: two
+    balls are torn apart, but a surface in one piece may be covered without a tear, by wrinkles.
+    Left out: the encoder, and the paper's training of F before T; T starts as no movement instead.
     """
 
     def networks(self, generator: torch.Generator) -> Sheets:

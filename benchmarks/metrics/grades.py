@@ -28,7 +28,12 @@ STARVED_SHARE = 0.02
 """Fraction of the surface that may be starved in a usable map: that may get less than a quarter of
 its fair area (see `benchmarks.metrics.usability`)."""
 
-FROM_POINTS = frozenset({"parapoint", "computed", "fam", "nuvo", "meshed"})
+FROM_POINTS = frozenset(
+    {
+        *("parapoint", "computed", "meshed", "textured", "fam", "nuvo", "foldingnet", "atlasnet"),
+        *("diffsr", "elestruc", "gtif", "tearingnet", "flattening_net", "reggeonet"),
+    }
+)
 """Methods whose maps are made of points alone, so that a few flips at a face are forgiven."""
 
 BOUNDS = (
