@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 from typing import Never
 
 import click
@@ -30,4 +31,6 @@ for name, place, summary in (
 
 def main() -> Never:
     """The `parapoint` command."""
+    # Threads that spin while they wait keep the one that they wait for off a busy machine's core.
+    os.environ.setdefault("OMP_WAIT_POLICY", "passive")
     console.run(parapoint)

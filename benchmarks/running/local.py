@@ -68,7 +68,7 @@ class _Slot:
             pass_fds=[send],
             start_new_session=True,
             cwd=environment.ROOT,
-            env=os.environ | variables,
+            env={"OMP_WAIT_POLICY": "passive"} | os.environ | variables,  # see `parapoint.cli`
             bufsize=0,
         )
         os.close(send)

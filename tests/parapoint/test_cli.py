@@ -1,4 +1,5 @@
 import json
+import os
 
 import numpy as np
 import pytest
@@ -266,3 +267,16 @@ def test_numbers_out_of_range_are_one_line(command, option, value, cloud, capsys
     status, said, err = run([command, str(cloud), "--out", str(out), option, value], capsys)
     assert (status, said, err.count("\n")) == (2, "", 1)
     assert list(cloud.parent.iterdir()) == [cloud]
+
+
+@pytest.mark.parametrize(("given", "kept"), [(None, "passive"), ("active", "active")])
+def test_threads_sleep_while_they_wait_unless_the_user_says_otherwise(given, kept, monkeypatch):
+    monkeypatch.setenv("OMP_WAIT_POLICY", given or "")
+    if given is None:
+        monkeypatch.delenv("OMP_WAIT_POLICY")
+    seen: list[str | None] = []
+    monkeypatch.setattr(
+        cli.console, "run", lambda _: seen.append(os.environ.get("OMP_WAIT_POLICY"))
+    )
+    cli.main()
+    assert seen == [kept]

@@ -97,6 +97,7 @@ def test_a_cell_has_its_own_empty_folder_and_set_variables(curious):
         report = curious[seed].report
         assert report["hashes"] == "0"
         assert report["threads"] == "3"
+        assert report["waiting"] == "passive"
         assert report["is_temporary_folder"] is True
         assert report["work"] == []
         # The folder of the cell before is gone; the mark is no cell.
