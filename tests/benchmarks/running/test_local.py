@@ -45,6 +45,7 @@ class Curious:
             "numpy": np.random.random(),
             "hashes": os.environ["PYTHONHASHSEED"],
             "threads": os.environ["OPENBLAS_NUM_THREADS"],
+            "waiting": os.environ["OMP_WAIT_POLICY"],
             "is_temporary_folder": os.environ["TMPDIR"] == str(Path.cwd()),
             "work": sorted(path.name for path in Path.cwd().iterdir()),
             "cells": sorted(path.name == folder.name for path in folder.parent.iterdir()),
