@@ -227,6 +227,8 @@ def legend_below(made: Figure, places: Sequence[Axes]) -> None:
     for place in places:
         for handle, text in zip(*place.get_legend_handles_labels(), strict=True):
             found.setdefault(text, handle)
+    if not found:
+        return
     for columns in range(min(4, len(found)), 0, -1):
         legend = made.legend(
             list(found.values()), list(found), loc="lower center", ncols=columns,
