@@ -150,11 +150,11 @@ def test_a_plot_is_a_figure_that_can_be_restyled(fitted) -> None:
 def test_surfaces_of_other_libraries_are_taken() -> None:
     flat, faces = igl.triangulated_grid(17, 17)
     vertices = np.column_stack([flat, 0.2 * flat[:, 0] ** 2])
-    ours = ComputedMap().fit(Mesh(vertices, faces)).transform(vertices)
+    ours = ComputedMap(points=500).fit(Mesh(vertices, faces)).transform(vertices)
     sheet = trimesh.Trimesh(vertices, faces, process=False)
     open3d_mesh = SimpleNamespace(vertices=vertices, triangles=faces)
     for mesh in (sheet, open3d_mesh):
-        np.testing.assert_array_equal(ComputedMap().fit(mesh).transform(mesh), ours)
+        np.testing.assert_array_equal(ComputedMap(points=500).fit(mesh).transform(mesh), ours)
     bare = ComputedMap().fit(PointCloud(vertices)).transform(vertices)
     open3d_cloud = SimpleNamespace(points=vertices.tolist(), colors=[], normals=[])
     tensor = torch.tensor(vertices, requires_grad=True)

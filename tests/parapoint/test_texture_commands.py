@@ -76,8 +76,10 @@ def test_a_scan_becomes_a_textured_model_in_one_command(scan, tmp_path, capsys) 
 
 
 @pytest.mark.parametrize("command", ["unwrap", "fit", "map"])
-def test_the_last_lines_say_how_good_the_map_is(command, model, scan, tmp_path, capsys) -> None:
-    target = tmp_path / "scan.glb"
+def test_the_last_lines_say_how_good_the_map_is(command, model, scan, capsys, monkeypatch) -> None:
+    monkeypatch.setattr("parapoint.commands.output.TEXTURE", 64)
+    tmp_path = scan.parent
+    target = tmp_path / "model.glb"
     arguments = {
         "unwrap": ["unwrap", scan, "--out", target, "--texture", 64],
         "fit": ["fit", scan, "--out", target],
@@ -118,7 +120,10 @@ def test_every_phase_is_told(command, model, scan, capsys, monkeypatch) -> None:
     write(model, read_surface(scan), str(tmp_path / "mesh.obj"), texture=64)
     arguments = {
         "unwrap": ["unwrap", scan, "--out", tmp_path / "a.glb", "--texture", 64],
-        "bake": ["bake", tmp_path / "model", scan, "--map", "colour", "--out", tmp_path / "a.png"],
+        "bake": [
+            *("bake", tmp_path / "model", scan, "--map", "colour"),
+            *("--texture", 64, "--out", tmp_path / "a.png"),
+        ],
         "fit": ["fit", scan, "--out", tmp_path / "other"],
         "map": ["map", tmp_path / "model", scan, "--out", tmp_path / "a.glb"],
         "mesh": ["unwrap", tmp_path / "mesh.obj", "--out", tmp_path / "a.glb", "--texture", 64],
@@ -133,6 +138,7 @@ def test_every_phase_is_told(command, model, scan, capsys, monkeypatch) -> None:
     }
     place = arguments[command][0]
     watched = Watched()
+    monkeypatch.setattr("parapoint.commands.output.TEXTURE", 64)
     monkeypatch.setattr(f"parapoint.commands.{place}.bar", watched)
     assert run(arguments[command], capsys)[0] == 0
     assert watched.phases == wanted[command]

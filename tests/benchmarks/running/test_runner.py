@@ -506,16 +506,21 @@ def test_a_file_that_may_not_grow_ends_the_run_and_keeps_what_is_there(tmp_path)
     assert seeds(12) == [9, 10, 11]
 
 
+ALIKE = {"atlasnet", "diffsr", "elestruc", "gtif", "tearingnet", "reggeonet"}
+"""Networks that come into a cell as foldingnet or flattening_net do, by the same classes; the
+conformance suite holds that each repeats its map."""
+
+
 def test_every_method_gives_the_same_map_in_two_cells_or_says_that_it_does_not(
     tmp_path, monkeypatch
 ):
     monkeypatch.setattr(runner, "_measure", lambda *_: None)
-    names = [name for name in registry.METHODS if name != "external"]
+    names = [name for name in registry.METHODS if name not in {"external", *ALIKE}]
     specs = {name: f"{name}({endurance.BUDGETS.get(name, '')})" for name in names}
     made = {name: registry.method(spec)[1] for name, spec in specs.items()}
     names = [name for name in names if not registry.environment(made[name])]
     promised = [name for name in names if getattr(made[name], "deterministic", True)]
-    mesh, cloud = endurance.CASES
+    (mesh,), cloud = endurance.instant_suite(tmp_path, 1, 0, 0).cases, endurance.CASES[1]
     hashes: list[dict[str, str]] = []
     for folder in "one", "two":
         asked = [specs[name] for name in promised if name != "meshed"]
