@@ -207,7 +207,8 @@ def ply(data: bytes) -> Content:
             sizes_here, values, at = _ply_lists(body, begin, count, properties, INDICES)
             if name == "face":
                 sizes, corners = sizes_here, whole(values)
-                wedges = _ply_lists(body, begin, count, properties, {"texcoord"})[:2]
+                if any(item.name == "texcoord" for item in properties):
+                    wedges = _ply_lists(body, begin, count, properties, {"texcoord"})[:2]
             elif name == "tristrips":
                 triangles = strip_triangles(sizes_here, whole(values))
                 sizes, corners = np.full(len(triangles), 3), triangles.reshape(-1)

@@ -16,11 +16,13 @@ THIN = 1e-9
 """Share of a polygon's area below which a triangle of its fan counts as folded or flat."""
 MOST_CORNERS = 20_000
 """Corners that a polygon may have where no fan fills it: cutting it takes time by their square."""
-FEW_CORNERS = 32
+FEW_CORNERS = 16
 """Corners up to which a polygon is cut in no time, whatever its shape."""
 MOST_STEPS = 3e9
 """Steps, the cube of the corners each, that polygons may take which touch or cross themselves; the
 bridge to a hole touches."""
+LEAST_PASSES = 160
+"""A small polygon takes as many steps for the square of its corners as one of so many corners."""
 
 
 def triangle_rows(vertices: FloatArray, sizes: IntArray, corners: IntArray) -> IntArray:
@@ -106,7 +108,8 @@ def _refuse_large(polygons: IntArray, planes: FloatArray, steps: float) -> float
     count = planes.shape[1]
     taken = np.full(len(planes), float(count) ** 2)
     if FEW_CORNERS < count <= MOST_CORNERS:
-        taken[~shapely.is_simple(shapely.linearrings(planes))] *= count
+        crossing = ~shapely.is_simple(shapely.linearrings(planes))
+        taken[crossing] *= max(count, LEAST_PASSES)
     too_many = (steps + np.cumsum(taken) > MOST_STEPS) | (count > MOST_CORNERS)
     if too_many.any():
         raise InputError(
