@@ -50,11 +50,6 @@ RECIPES = {
         "get uvatlastool from the releases of https://github.com/microsoft/UVAtlas",
         "its usage text, with -wf for OBJ. It makes charts and repeats vertices at seams.",
     ),
-    "uvbake": Recipe(
-        "uvbake {input} -o {output}",
-        "get https://github.com/mattscott/uvbake",
-        "the wiki's CLI reference, revision 1. It makes charts.",
-    ),
     "surface_nvp": Recipe(
         "python scripts/train_injective_nvp.py --input {input} --output {output} --iters 1000",
         "clone https://github.com/Yomeko1/surface-nvp-parameterization, install its requirements "

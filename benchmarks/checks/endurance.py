@@ -43,6 +43,7 @@ from benchmarks.cases.suites import Suite
 from benchmarks.checks import faulty, hardships, instant
 from benchmarks.checks.bystanders import undisturbed
 from benchmarks.running import planning, runner
+from benchmarks.running.expectation import WHOLE_BUDGET
 from benchmarks.store import measuring, verifying
 from benchmarks.store.results import Store
 from parapoint import console
@@ -54,23 +55,7 @@ TIMING = ("seconds", "cpu_seconds", "load", "peak_memory_mb", "run")
 CASES = ("half_cylinder", "saddle@noise=0")
 """A mesh and a cloud, so that every method has a surface that it can take."""
 BUDGETS = {
-    **dict.fromkeys(
-        (
-            "parapoint",
-            "fam",
-            "nuvo",
-            "foldingnet",
-            "atlasnet",
-            "diffsr",
-            "elestruc",
-            "gtif",
-            "tearingnet",
-            "flattening_net",
-            "reggeonet",
-            "nsm",
-        ),
-        "points=120, subset=100, iterations=2",
-    ),
+    **dict.fromkeys(WHOLE_BUDGET, "points=120, subset=100, iterations=2"),
     "computed": "points=500",
     "geometry_image": "side=17",
     "meshed": "reconstruction=ball_pivoting",

@@ -66,13 +66,6 @@ assert words[:4] == ["-nologo", "-y", "-wf", "-o"]
 write_charts(words[4], *read(words[5]))
 """,
     ),
-    "uvbake": (
-        "uvbake",
-        """
-assert words[1] == "-o"
-write_charts(words[2], *read(words[0]))
-""",
-    ),
     "surface_nvp": (
         "scripts/train_injective_nvp.py",
         """
