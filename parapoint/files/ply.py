@@ -6,8 +6,6 @@ Ours, since trimesh takes PLY triangle strips for points and mixed binary polygo
 from __future__ import annotations
 
 import re
-import struct
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,6 +26,8 @@ from parapoint.files.content import (
 )
 from parapoint.surfaces.surface import FloatArray, IntArray
 
+BLOCK = 1 << 20
+"""Units of a file, bytes or numbers of a text file, among which rows are looked for at once."""
 INDICES = {"vertex_indices", "vertex_index"}
 UV_COLUMNS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texcoord_u", "texcoord_v"))
 """Names under which the UV of vertices stand."""
@@ -78,14 +78,6 @@ class _Body:
         pool = np.frombuffer(self.raw, dtype=np.uint8)
         chosen = pool[at[:, None] + np.arange(kind.itemsize)]
         return np.asarray(chosen.view(kind).reshape(-1), dtype=np.float64)
-
-    def count_at(self, kind: np.dtype[Any]) -> Callable[[int], int]:
-        """A function that reads a list's length at a unit."""
-        if self.numbers is not None:
-            numbers = self.numbers
-            return lambda at: int(numbers[at])
-        code = struct.Struct(kind.byteorder.replace("|", "=").replace("=", "<") + kind.char)
-        return lambda at: int(code.unpack_from(self.raw, at)[0])
 
 
 @dataclass
@@ -149,35 +141,14 @@ def _columns(
     body: _Body, at: int, count: int, properties: list[_Property]
 ) -> tuple[list[tuple[FloatArray, IntArray | None]], int]:
     """Values and sizes of each property, and the unit behind the element."""
-    starts = np.zeros((count, len(properties)), dtype=np.int64)
-    sizes = np.ones((count, len(properties)), dtype=np.int64)
-    widths = np.array([body.width(item.type) for item in properties], dtype=np.int64)
-    if all(item.count_type is None for item in properties):
-        row = int(widths.sum())
-        starts[:] = at + row * np.arange(count)[:, None] + np.cumsum(widths) - widths
-        at += row * count
-    else:
-        steps = [
-            None
-            if item.count_type is None
-            else (body.width(item.count_type), body.count_at(item.count_type))
-            for item in properties
-        ]
-        for row in range(count):
-            for k, step in enumerate(steps):
-                if step is not None:
-                    sizes[row, k] = step[1](at)
-                    at += step[0]
-                starts[row, k] = at
-                at += int(sizes[row, k] * widths[k])
-    found: list[tuple[FloatArray, IntArray | None]] = []
-    for k, item in enumerate(properties):
-        run = ranges(np.zeros(count, dtype=np.int64), sizes[:, k])
-        places = np.repeat(starts[:, k], sizes[:, k]) + widths[k] * run
-        found.append(
-            (body.values(places, item.type), None if item.count_type is None else sizes[:, k])
+    starts, sizes, end = _walk(body, at, count, properties)
+    return [
+        (
+            _run_of_values(body, starts[:, k], sizes[:, k], item.type),
+            None if item.count_type is None else sizes[:, k],
         )
-    return found, at
+        for k, item in enumerate(properties)
+    ], end
 
 
 def _parts(data: bytes) -> tuple[list[tuple[str, int, list[_Property]]], _Body]:
@@ -310,45 +281,89 @@ def _ply_lists(
     body: _Body, at: int, count: int, properties: list[_Property], names: set[str]
 ) -> tuple[IntArray, FloatArray, int]:
     """Lengths and values of an element's list of these names, and the unit behind the element."""
-    none = np.zeros(0, dtype=np.int64)
     if all(item.count_type is None for item in properties):
-        return none, np.zeros(0), at + count * sum(body.width(item.type) for item in properties)
-    steps: list[tuple[int, int, int, Callable[[int], int] | None, bool]] = []
-    index_type = np.dtype("i4")
-    for item in properties:
-        if item.count_type is None:
-            steps.append((body.width(item.type), 0, 0, None, False))
-            continue
-        wanted = item.name in names
-        if wanted:
-            index_type = item.type
-        steps.append(
-            (
-                0,
-                body.width(item.count_type),
-                body.width(item.type),
-                body.count_at(item.count_type),
-                wanted,
-            )
-        )
-    sizes: list[int] = []
+        end = at + count * sum(body.width(item.type) for item in properties)
+        return np.zeros(0, dtype=np.int64), np.zeros(0), end
+    starts, sizes, end = _walk(body, at, count, properties)
+    for k, item in enumerate(properties):
+        if item.name in names and item.count_type is not None:
+            return sizes[:, k], _run_of_values(body, starts[:, k], sizes[:, k], item.type), end
+    return np.zeros(0, dtype=np.int64), np.zeros(0), end
+
+
+def _run_of_values(
+    body: _Body, starts: IntArray, sizes: IntArray, kind: np.dtype[Any]
+) -> FloatArray:
+    """All values of lists that start at these units and have these sizes."""
+    within = ranges(np.zeros_like(sizes), sizes)
+    return body.values(np.repeat(starts, sizes) + body.width(kind) * within, kind)
+
+
+def _walk(
+    body: _Body, at: int, count: int, properties: list[_Property]
+) -> tuple[IntArray, IntArray, int]:
+    """(count, properties) the unit at which the values start, and their number; the unit behind.
+
+    Raises:
+        InputError: the body ends before the element does, or a list has a negative length.
+    """
+    rows, end = _row_starts(body, at, count, properties)
+    starts = np.zeros((count, len(properties)), dtype=np.int64)
+    sizes = np.ones((count, len(properties)), dtype=np.int64)
+    for k, item in enumerate(properties):
+        if item.count_type is not None:
+            sizes[:, k] = body.values(rows, item.count_type)
+            rows = rows + body.width(item.count_type)
+        starts[:, k] = rows
+        rows = rows + sizes[:, k] * body.width(item.type)
+    return starts, sizes, end
+
+
+def _row_starts(
+    body: _Body, at: int, count: int, properties: list[_Property]
+) -> tuple[IntArray, int]:
+    """(count,) the unit at which each row of an element starts, and the unit behind the last."""
+    if count == 0 or not properties:
+        return np.full(count, at), at
+    if count > body.size - at:  # a row takes a unit at least
+        raise InputError("ends early, in a list")
+    stride = int(_row_ends(body, np.array([at]), properties)[0]) - at
+    even = at + stride * np.arange(count)
+    fits = 0 < stride <= (body.size - at) // count
+    if fits and (_row_ends(body, even, properties) == even + stride).all():
+        return even, at + stride * count
     starts: list[int] = []
-    for _ in range(count):
-        for skip, count_width, width, count_at, wanted in steps:
-            if count_at is None:
-                at += skip
-                continue
-            size = count_at(at)
-            at += count_width
-            if size < 0:
+    while len(starts) < count:
+        # The ends of the rows that would start at each of many units, true rows or not, take a
+        # few calls; then one look a row leads from each true row to the next.
+        begin, behind = at, min(at + BLOCK, body.size)
+        ends = _row_ends(body, np.arange(begin, behind), properties).tolist()
+        while at < behind and len(starts) < count:
+            starts.append(at)
+            at = ends[at - begin]
+            if at <= starts[-1]:
                 raise InputError("has a list of negative length")
-            if wanted:
-                sizes.append(size)
-                starts.append(at)
-            at += size * width
-        if at > body.size:
+        if at > body.size or (at == body.size and len(starts) < count):
             raise InputError("ends early, in a list")
-    run = integers(sizes)
-    width = body.width(index_type)
-    places = np.repeat(integers(starts), run) + width * ranges(np.zeros_like(run), run)
-    return run, body.values(places, index_type), at
+    return integers(starts), at
+
+
+def _row_ends(body: _Body, at: IntArray, properties: list[_Property]) -> IntArray:
+    """(n,) the units behind rows that start at these units (n,).
+
+    It is beyond the body if the row would be, and -1 if a list has a negative length.
+    """
+    beyond = body.size + 1
+    is_negative = np.zeros(len(at), dtype=bool)
+    for item in properties:
+        size: IntArray | int = 1
+        if item.count_type is not None:
+            width = body.width(item.count_type)
+            known = at + width <= body.size
+            counts = np.full(len(at), float(beyond))
+            counts[known] = np.fmin(body.values(at[known], item.count_type), beyond)
+            is_negative |= counts < 0
+            size = np.maximum(counts, 0).astype(np.int64)
+            at = at + width
+        at = np.minimum(at + size * body.width(item.type), beyond)
+    return np.where(is_negative, -1, at)
