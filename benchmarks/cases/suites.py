@@ -188,7 +188,15 @@ SUITES: dict[str, Suite] = {
             "cuts",
             "SLIM along automatic, learned and artists' seams",
             members("artist", "closed", "genus"),
-            (ISOMETRIC, "automatic+slim", "seamster", LEARNED_SEAM, HYBRID, "artist+slim"),
+            (
+                ISOMETRIC,
+                "automatic+slim",
+                "seamster",
+                "erickson_har_peled",
+                LEARNED_SEAM,
+                HYBRID,
+                "artist+slim",
+            ),
         ),
         Suite(
             "core",
