@@ -22,8 +22,8 @@ FLATTENING_SHARE = 0.5
 """Share of a time budget that the map to be fitted takes at most."""
 REFINEMENT_SHARE = 0.15
 """Share of the steps, and of what is left of the time budget, that the refinement takes."""
-EXTENT = 8.0
-"""Longest side of the flattened mesh as the networks see it; with 2 they learn slower."""
+EXTENT = 16.0
+"""Longest side of the flattened mesh as the networks see it; with less they learn slower."""
 REFINED_AT = 20_000
 """Samples at most at which the distortion is lowered."""
 CHECKED = 4_000
@@ -42,8 +42,8 @@ class NSM(NeuralMethod):
     boundary is free, flips of h are penalised (parameterization, section 4). A vertex lies at h of
     its place in the flattened mesh.
 
-    Ours: a smaller network, squareplus in place of softplus, SOAP in place of RMSProp. Left out:
-    maps between two surfaces, and collections of them.
+    Ours: a smaller network, squareplus in place of softplus, SOAP in place of RMSProp, and more
+    samples where f is far off. Left out: maps between two surfaces, and collections of them.
 
     Attributes:
         points: samples of the triangles.
@@ -90,10 +90,7 @@ class NSM(NeuralMethod):
         generator = torch.Generator().manual_seed(seed)
         fitted, refined = SurfaceMap(generator), Refinement(generator)
         samples = triangles.drawn(self.points, generator)
-
-        def chosen(among: int) -> torch.Tensor:
-            return torch.randint(among, (self.subset,), generator=generator)
-
+        batches = of.batches(fitted, samples, self.subset, generator)
         trace: list[TracePoint] = []
 
         def train(network: torch.nn.Module, terms: Terms, rate: float, end: float) -> None:
@@ -106,7 +103,7 @@ class NSM(NeuralMethod):
                 trace.append(TracePoint(len(trace) + 1, clock.worked() - began, losses))
 
         def overfit() -> dict[str, torch.Tensor]:
-            return of.overfit_terms(fitted, samples.rows(chosen(self.points)))
+            return of.overfit_terms(fitted, samples.rows(next(batches)))
 
         train(fitted, overfit, of.RATES[0], 1 - REFINEMENT_SHARE)
         steps_of_fit = len(trace)
@@ -114,7 +111,7 @@ class NSM(NeuralMethod):
         forms = of.first_forms(fitted, refined_at)
 
         def distortion() -> dict[str, torch.Tensor]:
-            rows = chosen(len(forms))
+            rows = torch.randint(len(forms), (self.subset,), generator=generator)
             return of.distortion_terms(refined, refined_at[rows], forms[rows])
 
         train(refined, distortion, of.RATES[1], 1.0)

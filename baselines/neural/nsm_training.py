@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import torch
@@ -19,6 +20,10 @@ EPSILON = 0.01
 """The paper's ε, added to a first form before it is inverted."""
 TINY = 1e-6
 """Added to squared determinants of the refinement."""
+ROUND = 1_000
+"""Steps after which the samples are weighed anew."""
+AT_ONCE = 8_192
+"""Samples whose errors are looked at together."""
 
 
 class Samples(NamedTuple):
@@ -65,6 +70,28 @@ class Triangles:
         share = torch.stack([1 - root, root * (1 - second), root * second], dim=1)
         uv, points = ((share * of[face]).sum(1) for of in (self.flat, self.solid))
         return Samples(uv, points, self.normals[face], self.jacobians[face])
+
+
+def batches(
+    surface: SurfaceMap, samples: Samples, size: int, generator: torch.Generator
+) -> Iterator[Tensor]:
+    """Rows (size,) of the samples for one step after another, without end.
+
+    Half of them are drawn evenly, and half in proportion to how far the map is off there: between
+    the two sides of a seam that nearly touch in the plane it stays far off for long.
+    """
+    while True:
+        apart = distances(surface, samples)
+        weight = 1 + apart / apart.mean().clamp(min=TINY)
+        rows = torch.multinomial(weight, ROUND * size, replacement=True, generator=generator)
+        yield from rows.reshape(ROUND, size)
+
+
+@torch.no_grad()
+def distances(surface: SurfaceMap, samples: Samples) -> Tensor:
+    """(N,) how far the map is off at each sample."""
+    parts = zip(*(torch.split(of, AT_ONCE) for of in (samples.uv, samples.points)), strict=True)
+    return torch.cat([(surface(uv[None])[0] - points).norm(dim=1) for uv, points in parts])
 
 
 def overfit_terms(surface: SurfaceMap, at: Samples) -> dict[str, Tensor]:

@@ -140,8 +140,8 @@ def bare_uvatlas(mesh: Mesh, _: Parameterization) -> Call:
 
     def call() -> None:
         made = open3d.t.geometry.TriangleMesh(
-            open3d.core.Tensor(in_unit(mesh.vertices, mesh.faces).astype(np.float32)),
-            open3d.core.Tensor(mesh.faces.copy()),
+            open3d.core.Tensor.from_numpy(in_unit(mesh.vertices, mesh.faces).astype(np.float32)),
+            open3d.core.Tensor.from_numpy(mesh.faces.copy()),
         )
         made.compute_uvatlas(size=512, gutter=1.0, max_stretch=1 / 6, nthreads=1)
         made.triangle.texture_uvs.numpy()

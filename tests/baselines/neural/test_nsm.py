@@ -8,7 +8,9 @@ from baselines.hybrid import AutomaticSLIM
 from baselines.neural.nsm import NSM
 from baselines.neural.nsm_networks import Refinement, SurfaceMap, with_axes
 from baselines.neural.nsm_training import (
+    ROUND,
     Triangles,
+    batches,
     distortion_terms,
     first_forms,
     overfit_terms,
@@ -123,3 +125,23 @@ def test_a_cloud_and_a_bad_budget_are_refused():
         NSM().parameterize(PointCloud(irregular_disk().vertices), seed=0)
     with pytest.raises(InputError, match="time_budget"):
         NSM(time_budget=0.0)
+
+
+def test_half_of_the_samples_are_drawn_where_the_map_is_off():
+    samples = Triangles(FLAT, FLAT @ A.T).drawn(10_000, generator())
+    samples.points[:100, 2] += 3  # the map `plane` is right at all others
+    rows = next(batches(plane, samples, 4_000, generator()))
+    assert (rows < 100).float().mean().item() == pytest.approx(0.505, abs=0.02)
+    right = Triangles(FLAT, FLAT @ A.T).drawn(10_000, generator())
+    rows = next(batches(plane, right, 4_000, generator()))
+    assert (rows < 100).float().mean().item() == pytest.approx(0.01, abs=0.005)
+
+
+def test_samples_are_weighed_anew_after_each_round():
+    samples = Triangles(FLAT, FLAT @ A.T).drawn(1_000, generator())
+    drawn = batches(plane, samples, 8, generator())
+    before = torch.cat([next(drawn) for _ in range(ROUND)])
+    samples.points[7] += 3
+    after = torch.cat([next(drawn) for _ in range(ROUND)])
+    assert (before == 7).float().mean().item() < 0.005
+    assert (after == 7).float().mean().item() == pytest.approx(0.5, abs=0.02)

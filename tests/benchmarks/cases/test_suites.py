@@ -37,6 +37,7 @@ def test_the_suites():
         "cuts",
         "neural",
         "field",
+        "hard",
         "gpu",
         "bake",
         "drawn",
@@ -148,6 +149,10 @@ def test_the_field_has_equal_budgets():
     assert {budget for budget in budgets if budget} == {60.0}
     assert len([budget for budget in budgets if budget]) >= 7
     assert SUITES["field"].cases == (*SUITES["paper"].cases, "camelhead")
+    assert SUITES["hard"].cases == (*SUITES["wild"].cases, *SUITES["scans"].cases)
+    assert SUITES["hard"].methods == tuple(
+        spec.replace("time_budget=60", "time_budget=5") for spec in SUITES["field"].methods
+    )
 
 
 def test_a_drawn_seam_is_part_of_what_makes_results_comparable(tmp_path, monkeypatch):
