@@ -25,6 +25,9 @@ FIELDS = 44
 
 SPANNING_TONE = linear([0.90, 0.91, 0.90])
 
+LEFT_OUT_TONE = linear([0.80, 0.80, 0.80])
+"""Of faces that a map leaves out, and of what is not defined on a scale."""
+
 ANGLE_SCALE, AREA_SCALE = ("magma_r", 0.0, 2.0), ("PuOr_r", -3.0, 3.0)
 """Colour map and range of log2(sigma1 / sigma2), and of log2(UV area / 3D area)."""
 
@@ -32,6 +35,8 @@ ANGLE_SCALE, AREA_SCALE = ("magma_r", 0.0, 2.0), ("PuOr_r", -3.0, 3.0)
 @dataclass(frozen=True, eq=False)
 class Map:
     """A parameterization of a mesh, ready to be drawn.
+
+    Faces that it leaves out (NaN) are drawn in one tone on the surface, and nowhere in the plane.
 
     Attributes:
         mesh: the surface.
@@ -45,6 +50,17 @@ class Map:
     def _state(self) -> MapState:
         return MapState(self.mesh, self.parameterization)
 
+    @cached_property
+    def covered(self) -> BoolArray:
+        """(F,) faces that the map does not leave out. `_state` knows these alone."""
+        return self.parameterization.covered
+
+    def _spread(self, values: FloatArray | BoolArray, rest: float) -> np.ndarray:
+        """(F,) `values` of the `covered` faces, and `rest` for the others."""
+        full = np.full(len(self.covered), rest, dtype=values.dtype)
+        full[self.covered] = values
+        return full
+
     @property
     def has_area(self) -> bool:
         """Whether any face has an area in the plane: else there is nothing to see."""
@@ -56,14 +72,15 @@ class Map:
 
         Most maps have none: their overlaps, a fourth of the time of their pictures, are not needed.
         """
-        if spanning_edges(self.mesh, self.parameterization).any():
-            return self._state.spanning
-        return np.zeros(len(self.mesh.faces), dtype=np.bool_)
+        of = self if self.covered.all() else self._state
+        if spanning_edges(of.mesh, of.parameterization).any():
+            return self._spread(self._state.spanning, False)
+        return np.zeros(len(self.covered), dtype=np.bool_)
 
     @cached_property
     def flipped(self) -> BoolArray:
         """(F,) faces turned against the majority of their chart; spanning faces are not counted."""
-        return self._state.validity.flipped & ~self.spanning
+        return self._spread(self._state.validity.flipped, False) & ~self.spanning
 
     @property
     def distortion(self) -> FaceDistortion:
@@ -73,17 +90,23 @@ class Map:
 
     @cached_property
     def uv(self) -> FloatArray:
-        """(F, 3, 2) uv of the corners: area as on the surface, upright, seen from outside."""
+        """(F, 3, 2) uv of the corners: area as on the surface, upright, seen from outside.
+
+        A face that the map leaves out lies at one point in the middle.
+        """
         uv = self.parameterization.uv[self.parameterization.corners]
-        signed = self._state.triangles.uv_area
-        kept = ~self.spanning if (~self.spanning & (signed != 0)).any() else signed != 0
+        signed = self._spread(self._state.triangles.uv_area, 0.0)
+        kept = self.covered & ~self.spanning
+        kept = kept if (kept & (signed != 0)).any() else signed != 0
         area = float(np.abs(signed[kept]).sum())
         scale = np.sqrt(self.mesh.face_areas[kept].sum() / area) if area > 0 else 1.0
-        middle = (uv.min(axis=(0, 1)) + uv.max(axis=(0, 1))) / 2
+        known = uv[self.covered]
+        middle = (known.min(axis=(0, 1)) + known.max(axis=(0, 1))) / 2
         uv = (uv - middle) * scale
+        uv[~self.covered] = 0
         if signed[kept].sum() < 0:
             uv = uv * [-1, 1]
-        if len(np.unique(self.parameterization.charts())) == 1:
+        if len(np.unique(self.parameterization.charts()[self.covered])) == 1:
             points = uv[kept].reshape(-1, 2)
             _, axes = np.linalg.eigh(np.cov(points.T))
             up = axes[:, 1] * (1 if axes[1, 1] >= 0 else -1)
@@ -96,14 +119,14 @@ class Map:
 
         Those along which the vertices of the mesh itself are doubled are among them.
         """
-        of = self._state if self._state.welded else self
+        of = self if self.covered.all() and not self._state.welded else self._state
         return np.asarray(of.mesh.vertices[of.parameterization.seams(of.mesh)])
 
     def by_face(self, values: FloatArray) -> FloatArray:
         """(F,) `values` of the faces in `distortion`, NaN for the others."""
-        full = np.full(len(self.mesh.faces), np.nan)
+        full = np.full(np.count_nonzero(self.covered), np.nan)
         full[self.distortion.faces] = values
-        return full
+        return self._spread(full, np.nan)
 
     @cached_property
     def angle(self) -> FloatArray:
@@ -127,7 +150,7 @@ def heat(values: FloatArray, scale: tuple[str, float, float]) -> Floats:
     known = ~np.isnan(values)
     place = np.clip((np.where(known, values, low) - low) / (high - low), 0, 1)
     colours = colormaps[name](place)[:, :3]
-    return linear(np.where(known[:, None], colours, 0.8))
+    return np.where(known[:, None], linear(colours), LEFT_OUT_TONE)
 
 
 def textured(view: View, found: Map) -> Image:
@@ -135,6 +158,7 @@ def textured(view: View, found: Map) -> Image:
     colours = view.checker(found.uv - found.uv.min(axis=(0, 1)), FIELDS / view.scene.size)
     colours = _mixed(colours, FLIP_ORANGE, found.flipped[view.face], 0.75)
     colours = _mixed(colours, SEAM_GREEN, found.spanning[view.face], 0.8)
+    colours = _mixed(colours, LEFT_OUT_TONE, ~found.covered[view.face], 1.0)
     return view.image(_mixed(colours, SEAM_GREEN, view.near_lines(found.seams, 2.6), 1.0))
 
 
@@ -177,7 +201,7 @@ class Layout:
 
 def _outline(found: Map) -> FloatArray:
     """(n, 2, 3) the edges around the charts, at the height of `Layout`."""
-    kept = ~found.spanning
+    kept = found.covered & ~found.spanning
     _, edge, count = edge_table(found.parameterization.corners[kept])
     uv = found.uv[kept]
     ends = np.stack([uv, np.roll(uv, -1, axis=1)], axis=2).reshape(-1, 2, 2)[count[edge] == 1]

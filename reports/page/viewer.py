@@ -32,6 +32,11 @@ Script = tuple[Mapping[str, object], Mapping[str, npt.NDArray[Any]]]
 LARGEST = 200_000
 """Most faces of a model that the viewer is given; larger ones have their pictures only."""
 
+LEFT_OUT = 5
+"""State of a face that the map leaves out. It is odd, like that of one that spans a seam: the
+distortion of neither is given.
+"""
+
 LEVELS = 30
 """Distortion is given in this many steps of its scale; the number after them says: not defined."""
 
@@ -280,6 +285,7 @@ def uv_map(
     distortion: dict[str, tuple[FloatArray, float, float]],
     spanning: BoolArray,
     flipped: BoolArray,
+    covered: BoolArray,
 ) -> Script:
     """A map as it is drawn: facts and arrays of its `script`.
 
@@ -290,23 +296,26 @@ def uv_map(
         distortion: by name (F,) values, NaN where not defined, and the ends of their scale.
         spanning: (F,) faces that span a learned seam.
         flipped: (F,) faces turned over.
+        covered: (F,) faces that the map does not leave out; no other shares a row of uv with them.
     """
     if len(mesh.faces) > LARGEST:
         return {"large": len(mesh.faces)}, {}
     mesh, corner, _ = ordered(mesh)
     order = corner[:, 0] // 3
-    at = parameterization.corners.reshape(-1)[corner]
+    own = np.where(covered[:, None], parameterization.corners, len(parameterization.uv))
+    at = own.reshape(-1)[corner]
     rows, corners = indexed(mesh, at, uv.reshape(-1, 2)[corner])
     moved = np.flatnonzero(corners.reshape(-1) != mesh.faces.reshape(-1))
     vertex = np.arange(len(rows))
     vertex[corners] = mesh.faces
     of_shape, space = quantised(mesh.vertices, POSITION_BITS)
     box, places = quantised(rows, UV_BITS)
+    state = np.where(covered, spanning + 2 * flipped, LEFT_OUT).astype(np.uint8)
     guess = rough(space[mesh.faces], places[corners], _step(box) / _step(of_shape))
-    guess = {name: np.where(spanning[order], np.nan, values) for name, values in guess.items()}
+    guess = {name: np.where(state[order] % 2, np.nan, values) for name, values in guess.items()}
     return {"box": box}, {
         "uv": surprises(places, corners, UV_BITS, space[vertex]),
-        "state": (spanning + 2 * flipped).astype(np.uint8)[order],
+        "state": state[order],
         "moved": steps(np.stack([moved, corners.reshape(-1)[moved]], axis=1)),
         **{
             name: levels(values[order], low, high) - levels(guess[name], low, high)

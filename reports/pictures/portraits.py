@@ -100,6 +100,7 @@ def viewed(found: Map) -> viewer.Script:
         },
         spanning=found.spanning,
         flipped=found.flipped,
+        covered=found.covered,
     )
 
 

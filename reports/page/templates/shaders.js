@@ -38,7 +38,7 @@ window.shaders = (levels) => {
     void main() {
       if (picking) { int f = face + 1; colour = vec4(f & 255, (f >> 8) & 255, (f >> 16) & 255, 255) / 255.0; return; }
       float tone = board(at * fields);
-      bool spans = about.z == 1.0, flips = about.z >= 2.0;
+      bool spans = about.z == 1.0, left = about.z > 4.0, flips = about.z >= 2.0 && !left;
       vec3 normals = linear((0.5 + 0.42 * normalize(own)) * (0.30 + 0.70 * open.x));
       vec3 c = mode == 2 ? heat(about.x, 0.25) : mode == 3 ? heat(about.y, 0.75)
         : mode == 4 ? (plane ? PALE : CLAY) : mode == 1 ? normals
@@ -46,6 +46,7 @@ window.shaders = (levels) => {
       if (mode == 0 || mode == 4) {
         if (flips) c = mix(c, ORANGE, 0.75);
         if (spans) c = plane ? PALE : mix(c, GREEN, 0.8);
+        if (left) c = vec3(0.60);
       } else if (spans && plane) c = PALE;
       if (!plane) {
         vec3 n = normalize(own);

@@ -356,7 +356,7 @@
       }
       const open = sharing(corners), border = [], seams = [];
       for (let at = 0; at < corners.length; at++)
-        if (open[at] === 1) (shape.outer[at] === 1 ? border : seams).push(corners[at], corners[at % 3 === 2 ? at - 2 : at + 1]);
+        if (open[at] === 1 && kind[Math.floor(at / 3)] < 4) (shape.outer[at] === 1 ? border : seams).push(corners[at], corners[at % 3 === 2 ? at - 2 : at + 1]);
       Object.assign(this, { uv: gathered(rows, 2, corners), angle, area, kind });
       const low = [Infinity, Infinity], high = [-Infinity, -Infinity];
       for (let at = 0; at < this.uv.length; at++) {
@@ -406,7 +406,7 @@
       const words = (step, name, limits) => step > facts.levels ? `${name} not defined`
         : `${name} ${step === facts.levels ? "≥ " : step === 0 && limits[0] < 0 ? "≤ " : ""}${value(limits, step).toFixed(2)}`;
       this.note.textContent = face < 0 ? "" : `face ${shape.order[face]}: ${words(this.angle[face], "stretch", facts.limits.angle)}, `
-        + `${words(this.area[face], "area ×", facts.limits.area)}${["", ", spans a seam", ", flipped", ", flipped"][this.kind[face]]}`;
+        + `${words(this.area[face], "area ×", facts.limits.area)}${["", ", spans a seam", ", flipped", ", flipped", "", ", left out by the map"][this.kind[face]]}`;
     }
   }
 

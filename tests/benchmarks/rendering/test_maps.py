@@ -4,8 +4,19 @@ import igl
 import numpy as np
 import pytest
 
+from benchmarks.rendering.camera import camera
 from benchmarks.rendering.colours import linear
-from benchmarks.rendering.maps import ANGLE_SCALE, SPANNING_TONE, Layout, Map, _outline, heat
+from benchmarks.rendering.maps import (
+    ANGLE_SCALE,
+    LEFT_OUT_TONE,
+    SPANNING_TONE,
+    Layout,
+    Map,
+    _outline,
+    heat,
+    textured,
+)
+from benchmarks.rendering.scene import Scene
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh
 
@@ -115,3 +126,52 @@ def test_a_seam_of_doubled_vertices_is_drawn_as_one_of_the_map() -> None:
     found = Map(mesh, Parameterization(uv, mesh.faces))
     assert sorted(found.seams[0].tolist()) == [[0, 1, 0], [1, 0, 0]]
     assert len(found.seams) == 1
+
+
+def region() -> Map:
+    """A flat map of the sheet's left half; of its right half the map says nothing."""
+    mesh = sheet()
+    uv = flat(mesh).uv
+    return Map(mesh, Parameterization(np.where(uv[:, :1] > 0.5, np.nan, uv), mesh.faces))
+
+
+def test_faces_that_a_map_leaves_out_are_nowhere_in_the_plane() -> None:
+    found = region()
+    assert found.covered.sum() == len(found.mesh.faces) / 2
+    assert np.isfinite(found.uv).all()
+    a, b = found.uv[:, 1] - found.uv[:, 0], found.uv[:, 2] - found.uv[:, 0]
+    areas = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
+    np.testing.assert_array_equal(areas > 0, found.covered)
+    assert areas.sum() == pytest.approx(found.mesh.face_areas[found.covered].sum())
+    assert found.covered[Layout(found, 40)._view.face].all()
+    assert np.ptp(found.uv, axis=(0, 1)).min() == pytest.approx(np.ptp(_outline(found)[..., 0]))
+
+
+def test_faces_that_a_map_leaves_out_have_one_tone_and_no_marks() -> None:
+    found = region()
+    assert not (found.spanning | found.flipped).any()
+    for values in (found.angle, found.area):
+        np.testing.assert_array_equal(np.isfinite(values), found.covered)
+    assert len(found.seams) == 0
+    scene = Scene(found.mesh, shadows=False)
+    view = scene.view(camera(found.mesh, np.eye(3)[2], np.eye(3)[1]), 40, 1)
+    assert 0.3 < found.covered[view.face].mean() < 0.7
+    tones = view.image(np.where(found.covered[view.face, None], 0, LEFT_OUT_TONE))
+    shown, left = textured(view, found).reshape(-1, 4), ~found.covered[view.face]
+    np.testing.assert_array_equal(shown[view.sample[left]], tones.reshape(-1, 4)[view.sample[left]])
+
+
+def test_marks_of_a_region_stand_at_their_faces() -> None:
+    """The globe without its first face: all that is marked there is marked here."""
+    whole = globe()
+    corners = whole.parameterization.corners
+    first = int(np.flatnonzero(whole.spanning)[0])
+    uv = np.vstack([whole.parameterization.uv, np.full((3, 2), np.nan)])
+    kept = np.arange(len(corners)) != first - 1
+    assert not whole.spanning[~kept].any()
+    cut = np.where(kept[:, None], corners, len(uv) + np.array([-3, -2, -1]))
+    found = Map(whole.mesh, Parameterization(uv, cut))
+    np.testing.assert_array_equal(found.covered, kept)
+    np.testing.assert_array_equal(found.spanning, whole.spanning)
+    np.testing.assert_array_equal(found.flipped, whole.flipped)
+    np.testing.assert_array_equal(np.isnan(found.angle), whole.spanning | ~kept)

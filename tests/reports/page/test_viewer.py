@@ -174,7 +174,7 @@ def test_a_shape_is_given_to_a_65535th_of_its_size():
 def data(mesh, result):
     """A map, and what is read of it."""
     found = Map(mesh, result)
-    state = {"spanning": found.spanning, "flipped": found.flipped}
+    state = {name: getattr(found, name) for name in ("spanning", "flipped", "covered")}
     heat = {"angle": (found.angle, 0.0, 2.0)}
     made = viewer.uv_map(mesh, result, found.uv, distortion=heat, **state)
     return found, read(viewer.script("a.js", *made))[1]
@@ -222,6 +222,23 @@ def test_a_cut_map_comes_back_with_its_seams():
     np.testing.assert_allclose(
         again, found.uv.reshape(-1, 2)[order], atol=given["box"]["side"] / 16383
     )
+
+
+def test_faces_that_a_map_leaves_out_do_not_move_the_others():
+    mesh = sheet()
+    uv = flat(mesh).uv
+    region = Parameterization(np.where(uv[:, :1] > 0.5, np.nan, uv), mesh.faces)
+    found, given = data(mesh, region)
+    order, _, again, angle = drawn(mesh, given)
+    kept = found.covered[order[:, 0] // 3]
+    assert 0 < kept.sum() < len(kept)
+    np.testing.assert_allclose(
+        again, found.uv.reshape(-1, 2)[order], atol=given["box"]["side"] / 16383
+    )
+    np.testing.assert_array_equal(given["state"][:, 0], np.where(kept, 0, viewer.LEFT_OUT))
+    expected = viewer.levels(found.angle, 0.0, 2.0)[order[:, 0] // 3]
+    np.testing.assert_array_equal(angle[kept], expected[kept])
+    assert (given["angle"][~kept, 0] == 0).all()  # not defined, here and in the page
 
 
 def test_rough_distortion_of_a_stretch_known_by_hand():
