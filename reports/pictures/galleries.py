@@ -100,10 +100,8 @@ def models(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure:
         y0 = height - (number // across + 1) * (side + foot) + foot
         for at, kind in enumerate(("mesh-1", "mesh-2")):
             x = x0 + at * (side + gap)
-            put(
-                made.add_axes((x / width, y0 / height, side / width, side / height)),
-                pictures / model_file(case, kind),
-            )
+            box = (x / width, y0 / height, side / width, side / height)
+            put(made, box, pictures / model_file(case, kind))
         surface = contents.mesh(case)
         if surface is not None:
             size = f"{len(surface.faces):,} faces, {surface.topology}"
@@ -184,8 +182,8 @@ def cut_model(contents: Contents, case: str, pictures: Path) -> Figure | None:
     shown_all = [pictures / model_file(case, "mesh-1"), *(p for panel in panels for p in panel[2])]
     for number, picture in enumerate(shown_all):
         x = number * (side + 0.04) / WIDTH
-        place = made.add_axes((x, foot / (side + foot), side / WIDTH, side / (side + foot)))
-        put(place, picture)
+        box = (x, foot / (side + foot), side / WIDTH, side / (side + foot))
+        put(made, box, picture)
     name = wrapped(f"(a) {case.replace('_', ' ').replace('-', ' ')}", 20)
     top, below = 0.5 / (side + foot), 0.32 / (side + foot)
     made.text(side / 2 / WIDTH, top, name, ha="center", va="top", fontsize=8)
@@ -215,8 +213,7 @@ def ablation(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure
             shown = pictures_of(contents, case, label, ("layout", "checker-1"), pictures)
             for down, picture in enumerate(shown, start=1):
                 box = (x / WIDTH, (y - down * side) / height, side / WIDTH, side / height)
-                place = made.add_axes(box)
-                put(place, picture)
+                put(made, box, picture)
             row = contents.shown(case, label)
             made.text(
                 (x + side / 2) / WIDTH,
@@ -263,8 +260,7 @@ def ablation_of_the_paper(contents: Contents, pictures: Path) -> Figure | None:
         x = column * (side + gap)
         for down, picture in enumerate(shown, start=1):
             box = (x / WIDTH, (height - down * side) / height, side / WIDTH, side / height)
-            place = made.add_axes(box)
-            put(place, picture)
+            put(made, box, picture)
         made.text((x + side / 2) / WIDTH, 0.2 / height, words, ha="center", va="top", fontsize=8)
     return made
 

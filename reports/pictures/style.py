@@ -89,21 +89,43 @@ def figure(width: float, height: float) -> Figure:
     return made
 
 
-def put(place: Axes, picture: Path | str) -> None:
-    """Show a picture at `place`, at the size it is printed; other text as a note."""
-    place.set_axis_off()
+Box = tuple[float, float, float, float]
+"""Left, bottom, width and height of a part of a figure, as fractions of the whole."""
+
+
+def put(made: Figure, box: Box, picture: Path | str) -> None:
+    """Show a picture in the middle of `box`, at the size it is printed; other text as a note."""
+    sheet = _sheet(made)
     if isinstance(picture, str):
-        note(place, picture)
+        note(sheet, box, picture)
         return
     try:
         with Images.open(picture) as image:
-            box = place.get_window_extent()
-            scale = mpl.rcParams["savefig.dpi"] / mpl.rcParams["figure.dpi"]
             shown = image.convert("RGBA")
-            shown.thumbnail((round(box.width * scale), round(box.height * scale)))
-            place.imshow(shown)
     except OSError:
-        note(place, "no picture")
+        note(sheet, box, "no picture")
+        return
+    x, y, width, height = box
+    whole, dpi = made.get_size_inches(), mpl.rcParams["savefig.dpi"]
+    shown.thumbnail((round(width * whole[0] * dpi), round(height * whole[1] * dpi)))
+    fill = min(width * whole[0] / shown.width, height * whole[1] / shown.height)
+    wide, tall = fill * shown.width / whole[0], fill * shown.height / whole[1]
+    left, low = x + (width - wide) / 2, y + (height - tall) / 2
+    sheet.imshow(shown, extent=(left, left + wide, low, low + tall), aspect="auto")
+
+
+def _sheet(made: Figure) -> Axes:
+    """The axes of all pictures of a figure: axes of its own for each would cost more than it."""
+    for place in made.axes:
+        if place.get_label() == SHEET:
+            return place
+    place = made.add_axes((0, 0, 1, 1), label=SHEET, autoscale_on=False)
+    place.set_axis_off()
+    return place
+
+
+SHEET = "pictures"
+"""Label of the axes of all pictures of a figure."""
 
 
 def darken(made: Figure) -> None:
@@ -129,12 +151,10 @@ def _turned(colour: Any) -> Any:
     return colours if len(colours) != 1 else tuple(colours[0])
 
 
-def note(place: Axes, text: str) -> None:
-    """A grey remark in the middle of `place`."""
-    place.set_axis_off()
-    place.text(
-        0.5, 0.5, text, ha="center", va="center", color="0.45", transform=place.transAxes, wrap=True
-    )
+def note(sheet: Axes, box: Box, text: str) -> None:
+    """A grey remark in the middle of `box`."""
+    x, y, width, height = box
+    sheet.text(x + width / 2, y + height / 2, text, ha="center", va="center", color="0.45")
 
 
 def picture_grid(
@@ -168,8 +188,7 @@ def picture_grid(
         for column, picture in enumerate(pictures):
             x = left + column * (side + gap)
             box = (x / width, (y - tall) / height, side / width, tall / height)
-            place = made.add_axes(box)
-            put(place, picture)
+            put(made, box, picture)
         y -= tall + gap
     return made
 

@@ -2,6 +2,7 @@ import dataclasses
 import pickle
 from importlib import resources
 
+import matplotlib as mpl
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,13 +10,24 @@ from matplotlib.colors import to_hex, to_rgba
 from matplotlib.text import Text
 from PIL import Image as Images
 from pypdf import PdfReader
+from pypdf.generic import StreamObject
 
 from reports import contents as contents_module
 from reports.contents import ANGLE, AREA, ISOMETRIC, SEAM, contents
 from reports.pictures import figures, galleries, plots
 from reports.pictures.figures import draw, drawings, write
 from reports.pictures.galleries import leading
-from reports.pictures.style import DARK_INK, DARK_PAPER, darken, figure, look, plain_log, wrapped
+from reports.pictures.style import (
+    DARK_INK,
+    DARK_PAPER,
+    STYLE,
+    darken,
+    figure,
+    look,
+    plain_log,
+    put,
+    wrapped,
+)
 
 from ..conftest import HAND, NEFERTITI, Writer, flat, sheet
 
@@ -222,6 +234,37 @@ def test_pictures_in_a_pdf_are_jpegs_of_their_size(tmp_path):
     np.testing.assert_allclose(np.asarray(picture.image.convert("RGB"))[::-1], smooth, atol=20)
 
 
+def test_only_the_pictures_of_a_pdf_are_not_deflated(tmp_path):
+    made = figure(2, 1)
+    made.add_axes((0, 0, 0.5, 1)).imshow(np.arange(48, dtype=np.uint8).reshape(4, 4, 3))
+    made.text(0.6, 0.5, "words")
+    write(tmp_path, False, figures.Drawing("a", "T", "", (), lambda: made))
+    document = PdfReader(tmp_path / "a.pdf")
+    assert "words" in document.pages[0].extract_text()
+    number = len(document.xref[0])
+    streams = [document.get_object(at) for at in range(1, number)]
+    kinds = [one["/Filter"] for one in streams if isinstance(one, StreamObject)]
+    assert kinds.count("/DCTDecode") == 1
+    assert set(kinds) == {"/DCTDecode", "/FlateDecode"}
+
+
+def test_all_pictures_of_a_figure_stand_in_one_pair_of_axes(tmp_path):
+    Images.new("RGB", (20, 10), "red").save(tmp_path / "wide.webp")
+    with mpl.rc_context(STYLE):
+        made = figure(4, 2)
+        for x in (0, 0.5):
+            put(made, (x, 0, 0.5, 1), tmp_path / "wide.webp")  # two inches square
+        put(made, (0, 0, 1, 1), "why not")
+    (place,) = made.axes
+    assert place.get_position().bounds == (0, 0, 1, 1)
+    assert [shown.get_extent() for shown in place.images] == [
+        [0, 0.5, 0.25, 0.75],
+        [0.5, 1, 0.25, 0.75],
+    ]
+    (said,) = [text for text in texts(made) if text]
+    assert said == "why not"
+
+
 def test_names_are_parted_at_spaces_hyphens_and_underscores():
     assert wrapped("SLIM symmetric Dirichlet", 15) == "SLIM symmetric\nDirichlet"
     assert wrapped("nefertiti-lowres_odedstein", 20) == "nefertiti-lowres_\nodedstein"
@@ -301,7 +344,8 @@ def test_a_figure_for_dark_pages_turns_greys_and_keeps_colours(tmp_path):
     assert place.lines[0].get_color() in {"#0072B2", to_rgba("#0072B2")}
     np.testing.assert_allclose(shown.get_facecolor()[0], to_rgba(DARK_PAPER))
     np.testing.assert_allclose(shown.get_facecolor()[1], to_rgba(DARK_INK, 0.5))
-    figures.few_colours(made, DARK_PAPER, tmp_path / "dark.png")
+    with mpl.rc_context(STYLE):
+        figures.few_colours(made, DARK_PAPER, tmp_path / "dark.png")
     with Images.open(tmp_path / "dark.png") as image:
         assert image.convert("RGB").getpixel((0, 0)) == (0x1D, 0x20, 0x25)
 
