@@ -7,6 +7,7 @@ from reports.contents import (
     BIJECTIVE,
     ISOMETRIC,
     POINT_ANGLE,
+    POINT_AREA,
     WORST_PART,
     Contents,
     number,
@@ -16,14 +17,17 @@ from reports.ranking import means_may_rank
 from reports.tables.notes import environment_note, failure_notes, load_notes, method_notes
 from reports.tables.table import METHOD, Column, Table, Value, metric_column, short_columns
 
-MEANS = (ANGLE, ISOMETRIC, "stretch_l2", POINT_ANGLE)
+MEANS = (ANGLE, ISOMETRIC, "stretch_l2")
 """The metrics whose means over the common models stand side by side."""
+MEANS_OF_CLOUDS = (POINT_ANGLE, POINT_AREA)
+"""The same where no model has faces."""
 
 
 def methods(contents: Contents) -> Table:
     """One row a method, over all models: validity and the worst part before any mean."""
     common = common_cases(contents, contents.cases)
-    names = [name for name in MEANS if contents.means[name].notna().any()]
+    of_clouds = contents.clouds.issuperset(contents.cases)
+    names = MEANS_OF_CLOUDS if of_clouds else MEANS
     rows = []
     for label in contents.methods:
         found = {case: contents.records.get((case, label.short)) for case in contents.cases}
@@ -58,7 +62,7 @@ def methods(contents: Contents) -> Table:
         Column("coverage", "coverage %", digits=1, percent=True),
         *short_columns(names),
     ]
-    if contents.clouds.issuperset(contents.cases):  # whose maps have no faces to lie on others
+    if of_clouds:  # without faces none can lie on another
         columns = [column for column in columns if column.key != "one to one"]
     return Table(
         name="methods",
