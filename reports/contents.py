@@ -15,7 +15,7 @@ from typing import Any
 import pandas as pd
 
 from benchmarks.cases.suites import SUITES
-from benchmarks.metrics.grades import grade_of
+from benchmarks.metrics.grades import FROM_POINTS, grade_of
 from benchmarks.metrics.table import METRICS
 from benchmarks.store import measuring
 from benchmarks.store.results import Store
@@ -124,6 +124,11 @@ class Label:
         """Its parameters by name."""
         found: dict[str, Any] = json.loads(self.params)
         return found
+
+    @property
+    def input(self) -> str:
+        """What it reads: a "mesh", or the "points" alone."""
+        return "points" if self.method in FROM_POINTS else "mesh"
 
     @property
     def text(self) -> str:

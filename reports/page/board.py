@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from benchmarks.metrics.grades import FROM_POINTS
 from benchmarks.metrics.metric import GROUPS
 from benchmarks.metrics.table import METRICS
 from reports.contents import (
@@ -112,7 +111,7 @@ def _method(contents: Contents, label: Label) -> dict[str, object]:
         "name": label.short,
         "detail": "many charts, not ranked" if atlas else label.detail,
         "charts": "many" if atlas else "one",
-        "input": "points" if label.method in FROM_POINTS else "mesh",
+        "input": label.input,
         "ok": f"{len(rows) - len(bad)}/{len(rows)}",
         "share": (len(rows) - len(bad)) / len(rows),
         "bad": ", ".join(f"{count} {status}" for status, count in counts.items()),

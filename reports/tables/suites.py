@@ -23,6 +23,7 @@ from reports.means import STATISTICS, common_cases, common_values, own_values, s
 from reports.ranking import MOST_LEFT_OUT, TIMES, may_rank, means_may_rank
 from reports.tables.bakes import bakes
 from reports.tables.kinds import means_by_kind, success
+from reports.tables.methods import methods
 from reports.tables.notes import (
     environment_note,
     failure_notes,
@@ -428,6 +429,7 @@ def tables(contents: Contents) -> list[Table]:
     """The tables of a suite, in the order in which to read them."""
     made = [
         ablation(contents),
+        methods(contents),
         success(contents),
         overall(contents),
         means_by_kind(contents),

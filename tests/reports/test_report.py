@@ -102,7 +102,7 @@ def test_an_unchanged_report_is_the_same_to_the_byte(reported):
 def test_every_table_is_there_in_four_formats(reported):
     folder = reported / "report" / "tables" / "paper"
     names = {"conformality", "supplement", "comparison", "published", "failures", "cells"}
-    names |= {"success", "kinds", "cuts", "overall"}
+    names |= {"methods", "success", "kinds", "cuts", "overall"}
     assert {path.stem for path in folder.iterdir()} == names
     kinds = (".tex", ".md", ".csv", ".html")
     assert all((folder / f"{name}{kind}").exists() for name in names for kind in kinds)
