@@ -9,20 +9,13 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import zlib
 from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import IO, Any
 
 import matplotlib as mpl
-import numpy as np
 from matplotlib.figure import Figure
-from PIL import Image as Images
-from PIL import ImageColor
-from pypdf import PdfReader, PdfWriter
-from pypdf.generic import DecodedStreamObject, NameObject
 
 from benchmarks.cases.derived import is_drawn
 from benchmarks.store.rows import ResultRow
@@ -54,6 +47,7 @@ from reports.pictures.plots import (
     seams,
     singular_values,
 )
+from reports.pictures.printing import few_colours, light, on_white
 from reports.pictures.style import DARK_PAPER, STYLE, darken
 from reports.pictures.workers import done_by_several
 from reports.progress import QUIET, Progress
@@ -81,9 +75,6 @@ class Drawing:
 
 ENDINGS = (".pdf", ".png", "-dark.png")
 """What the files of a figure end in: for print, for light pages, for dark ones."""
-
-JPEG_QUALITY = 85
-"""Of pictures in a PDF."""
 
 MODELS, ROWS, PANELS = 12, 7, 9
 """Models on a page of models, of rows of pictures, of plots."""
@@ -246,7 +237,7 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
             "Angle distortion against time",
             "Angle difference over all faces along the way of every method that keeps a trace; a "
             "single marker is a method without one, at its end.",
-            make=partial(convergence, contents),
+            make=partial(convergence, contents, pictures),
             cases=cases,
             size=PANELS,
         ),
@@ -254,7 +245,7 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
             "convergence-area",
             "Area distortion against time",
             "Area discrepancy over all faces along the way, as in the figure of the angles.",
-            make=partial(area_convergence, contents),
+            make=partial(area_convergence, contents, pictures),
             cases=cases,
             size=PANELS,
         ),
@@ -275,7 +266,7 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
             "scaled to the surface's, faces that span a learned seam left out: the larger filled, "
             "the smaller as a line, heights relative to the higher peak of each row. An isometry "
             "is one peak at 1; a conformal map moves both together.",
-            make=partial(singular_values, contents),
+            make=partial(singular_values, contents, pictures),
             cases=meshes,
             size=PANELS,
         ),
@@ -404,53 +395,3 @@ def write(folder: Path, coarse: bool, drawing: Drawing) -> None:
             shown.set_data(picture)
         darken(made)
         few_colours(made, DARK_PAPER, dark)
-
-
-def few_colours(made: Figure, paper: str, path: Path) -> None:
-    """Write a figure as PNG of 256 colours, as many as the eye tells apart; `paper` stays exact."""
-    content, dpi = io.BytesIO(), mpl.rcParams["savefig.dpi"]
-    made.savefig(content, format="rgba", facecolor=paper)
-    width, height = (int(side * dpi) for side in made.get_size_inches())
-    whole = Images.frombytes("RGBA", (width, height), content.getvalue()).convert("RGB")
-    colours = whole.quantize(256, method=Images.Quantize.FASTOCTREE)
-    levels = np.reshape(colours.getpalette() or [], (-1, 3))
-    exact = np.array(ImageColor.getrgb(paper))
-    levels[(np.abs(levels - exact) < 8).all(axis=1)] = exact
-    colours.putpalette(levels.reshape(-1).tolist())
-    few = whole.quantize(palette=colours, dither=Images.Dither.FLOYDSTEINBERG)
-    with complete_file(path) as file:
-        few.save(file, format="PNG", optimize=True, dpi=(dpi, dpi))
-
-
-def on_white(picture: Any) -> Any:
-    """(h, w, 4) of a picture, in bytes, as (h, w, 3) on white; other arrays as they are."""
-    if picture.ndim != 3 or picture.shape[2] != 4:
-        return picture
-    shown = Images.fromarray(np.asarray(picture))
-    white = Images.new("RGBA", shown.size, "white")
-    return np.asarray(Images.alpha_composite(white, shown).convert("RGB"))
-
-
-def light(document: IO[bytes]) -> bytes:
-    """A PDF whose streams are plain with pictures as JPEG, which matplotlib cannot write.
-
-    That is a fourth of the bytes. The other streams are deflated.
-    """
-    reader = PdfReader(document)
-    for number in reader.xref[0]:
-        stream = reader.get_object(number)
-        if not isinstance(stream, DecodedStreamObject):
-            continue
-        if stream.get("/Subtype") == "/Image":
-            size: Any = (stream["/Width"], stream["/Height"])
-            content = io.BytesIO()
-            picture = Images.frombytes("RGB", size, stream.get_data())
-            picture.save(content, format="JPEG", quality=JPEG_QUALITY, optimize=True)
-            packed, way = content.getvalue(), "/DCTDecode"
-        else:
-            packed, way = zlib.compress(stream.get_data()), "/FlateDecode"
-        stream.set_data(packed)
-        stream[NameObject("/Filter")] = NameObject(way)
-    content = io.BytesIO()
-    PdfWriter(clone_from=reader).write(content)
-    return content.getvalue()

@@ -27,6 +27,9 @@ ARTIST_PICTURES = ("artist-checker-1", "artist-layout")
 
 CLOUD_PICTURES = ("cloud", "cloud-uv", "dense", "seams")
 
+CURVES = "curves"
+"""Kind of the file beside the pictures that holds what figures draw of a map as curves."""
+
 VIEWED = "view"
 """Kind of the file beside the pictures that the viewer reads, of a model and of a map."""
 
@@ -48,7 +51,7 @@ def map_kinds(row: ResultRow, *, points: bool, with_heat: bool) -> tuple[str, ..
     as_points = row.method == "parapoint" and (with_heat or bool(published_values(row.case)))
     return (
         *(kind for kind in TEXTURED_PICTURES if second_view or kind != "checker-2"),
-        *HEAT_PICTURES * with_heat,
+        *(*HEAT_PICTURES, CURVES) * with_heat,
         *CLOUD_PICTURES * as_points,
         VIEWED,
     )
@@ -65,4 +68,4 @@ def map_file(row: ResultRow, kind: str) -> str:
 
 
 def _ending(kind: str) -> str:
-    return "js" if kind == VIEWED else "webp"
+    return {VIEWED: "js", CURVES: "json"}.get(kind, "webp")

@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from benchmarks.metrics.distortion import (
-    angle_difference_mean,
-    area_discrepancy_total,
-    face_distortion,
-    triangles,
-)
-from benchmarks.rendering.maps import Map
 from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
-from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray
 from reports.contents import ANGLE, AREA, ISOMETRIC, SEAM, Contents, Label
+from reports.pictures.curves import BINS, curves_of
 from reports.pictures.galleries import leading
 from reports.pictures.style import (
     COLOURS,
@@ -101,42 +95,18 @@ def trace_of(contents: Contents, row: ResultRow) -> pd.DataFrame:
     )
 
 
-def quality_trace(contents: Contents, row: ResultRow) -> pd.DataFrame:
-    """Angle and area distortion over all faces along the way, where the maps were kept."""
-    mapped = contents.mapped(row)
-    if mapped is None:
-        return pd.DataFrame()
-    surface, result = mapped
-    records = []
-    for at in result.trace:
-        if at.uv is not None and len(at.uv) == len(result.uv):
-            try:
-                faces = triangles(surface, Parameterization(at.uv, result.corners))
-            except InputError:  # a state on the way that no number can measure
-                continue
-            found = face_distortion(faces)
-            records.append(
-                {
-                    "seconds": at.seconds,
-                    "angle": angle_difference_mean(found),
-                    "area": area_discrepancy_total(found),
-                }
-            )
-    return pd.DataFrame(records)
-
-
-def convergence(contents: Contents, cases: Sequence[str]) -> Figure | None:
+def convergence(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure | None:
     """Angle distortion against time for every method with a trace; others as a single point."""
-    return _convergence(contents, cases, "angle", ANGLE, "angle difference [rad]")
+    return _convergence(contents, pictures, cases, ANGLE)
 
 
-def area_convergence(contents: Contents, cases: Sequence[str]) -> Figure | None:
+def area_convergence(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure | None:
     """Area distortion against time, likewise."""
-    return _convergence(contents, cases, "area", AREA, "area discrepancy")
+    return _convergence(contents, pictures, cases, AREA)
 
 
 def _convergence(
-    contents: Contents, cases: Sequence[str], name: str, metric: str, title: str
+    contents: Contents, pictures: Path, cases: Sequence[str], metric: str
 ) -> Figure | None:
     curves: dict[str, list[tuple[Label, pd.DataFrame]]] = {}
     traced = False
@@ -145,13 +115,15 @@ def _convergence(
             row = contents.shown(case, label)
             if row is None or row.seconds is None:
                 continue
-            found = quality_trace(contents, row)
+            made_of = curves_of(contents, row, pictures)
+            way = made_of.way if made_of else np.empty((0, 3))
+            found = pd.DataFrame(way, columns=["seconds", ANGLE, AREA])
             traced |= len(found) > 1
             if len(found) < 2:
                 value = contents.measured.loc[contents.measured["id"] == row.id, metric]
-                found = pd.DataFrame({"seconds": [row.seconds], name: [float(value.iloc[0])]})
-            known = found[np.isfinite(found[name]) & _drawn(found["seconds"])].copy()
-            known[name] = known[name].clip(lower=LEAST_ANGLE if name == "angle" else None)
+                found = pd.DataFrame({"seconds": [row.seconds], metric: [float(value.iloc[0])]})
+            known = found[np.isfinite(found[metric]) & _drawn(found["seconds"])].copy()
+            known[metric] = known[metric].clip(lower=LEAST_ANGLE if metric == ANGLE else None)
             if len(known):  # a map of points has neither angles nor areas of faces
                 curves.setdefault(case, []).append((label, known))
     if not traced:
@@ -160,15 +132,15 @@ def _convergence(
     for place, (case, lines) in zip(places, curves.items(), strict=True):
         for label, known in lines:
             place.plot(
-                known["seconds"], known[name], label=label.short, markersize=3.5,
+                known["seconds"], known[metric], label=label.short, markersize=3.5,
                 **look(contents, label),
             )  # fmt: skip
         place.set_xscale("log")
-        if name == "angle":
+        if metric == ANGLE:
             place.set_yscale("log")
         place.set_title(case)
         place.set_xlabel("seconds")
-    places[0].set_ylabel(title)
+    places[0].set_ylabel({ANGLE: "angle difference [rad]", AREA: "area discrepancy"}[metric])
     share_limits(places)
     legend_below(made, places)
     return made
@@ -279,7 +251,7 @@ def share_limits(places: Sequence[Axes]) -> None:
                 plain_log(axis)
 
 
-def singular_values(contents: Contents, cases: Sequence[str]) -> Figure | None:
+def singular_values(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure | None:
     """How much of the surface is stretched by how much: both singular values, method by method."""
     cases = [case for case in cases if any(contents.shown(case, m) for m in contents.methods)]
     if not cases:
@@ -287,17 +259,16 @@ def singular_values(contents: Contents, cases: Sequence[str]) -> Figure | None:
     labels = contents.methods
     tall = 0.33 * len(labels) + 0.8
     made, places = small_multiples(len(cases), tall, left=0.21, bottom=0.5)
-    bins = np.linspace(-5, 5, 81)
-    middle = (bins[1:] + bins[:-1]) / 2
+    middle = (BINS[1:] + BINS[:-1]) / 2
     for number, (place, case) in enumerate(zip(places, cases, strict=True)):
         for line, label in enumerate(labels):
             row = contents.shown(case, label)
-            sigmas = singular_value_shares(contents, row, bins) if row else None
+            found = curves_of(contents, row, pictures) if row else None
             y = len(labels) - 1 - line
-            if sigmas is None:
+            if found is None or len(found.shares) < 2:
                 place.text(-4.8, y + 0.1, "no map", fontsize=6.5, color="0.5")
                 continue
-            larger, smaller = 0.85 * sigmas / sigmas.max()
+            larger, smaller = 0.85 * found.shares / found.shares.max()
             colour = look(contents, label)["color"]
             place.fill_between(middle, y, y + larger, step="mid", color=colour, alpha=0.4, lw=0)
             place.step(middle, y + smaller, where="mid", color=colour, linewidth=0.9)
@@ -314,23 +285,6 @@ def singular_values(contents: Contents, cases: Sequence[str]) -> Figure | None:
         place.set_title(case)
         place.set_xlabel("σ1 (filled), σ2 (line)")
     return made
-
-
-def singular_value_shares(
-    contents: Contents, row: ResultRow, bins: FloatArray
-) -> FloatArray | None:
-    """(2, n) shares of the area by log2 of each singular value; None without a map of the mesh."""
-    mapped = contents.mapped(row)
-    if mapped is None:
-        return None
-    found = Map(*mapped).distortion
-    shares = []
-    for sigma in (found.sigma1, found.sigma2):
-        known = found.finite & (sigma > 0)
-        at = np.clip(np.log2(sigma[known]), bins[0], bins[-1])
-        shares.append(np.histogram(at, bins, weights=found.area[known])[0])
-    made = np.array(shares)
-    return made if made.max() > 0 else None
 
 
 def cost(contents: Contents) -> Figure | None:

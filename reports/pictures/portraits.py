@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
@@ -28,10 +29,11 @@ from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh
 from reports.page import viewer
 from reports.pictures import clouds
-from reports.pictures.names import CLOUD_PICTURES, MODEL_PICTURES, VIEWED
+from reports.pictures.curves import Curves, curves, written
+from reports.pictures.names import CLOUD_PICTURES, CURVES, MODEL_PICTURES, VIEWED
 
-Content = Image | viewer.Script
-"""What is in a file beside the pictures: one of them, or what the viewer reads."""
+Content = Image | viewer.Script | Curves
+"""What is in a file: a picture, what the viewer reads, or what figures draw as curves."""
 
 
 class Portrait:
@@ -78,6 +80,7 @@ class Portrait:
             "angle-uv": lambda: layout.image(heat(found.angle, ANGLE_SCALE)),
             "area": lambda: first.image(heat(found.area, AREA_SCALE)[first.face]),
             "area-uv": lambda: layout.image(heat(found.area, AREA_SCALE)),
+            CURVES: lambda: curves(found),
             VIEWED: lambda: viewed(found),
         }
         made = {kind: makers[kind]() for kind in kinds if kind in makers}
@@ -105,8 +108,10 @@ def viewed(found: Map) -> viewer.Script:
 
 
 def save(content: Content, path: Path) -> None:
-    """Write a script, or a picture as WebP: the same content gives the same bytes."""
-    if isinstance(content, tuple):
+    """Write curves, a script, or a picture as WebP: the same content gives the same bytes."""
+    if isinstance(content, Curves):
+        write_text(path, json.dumps(written(content)) + "\n")
+    elif isinstance(content, tuple):
         write_text(path, viewer.script(path.name, *content))
     else:
         with complete_file(path) as file:

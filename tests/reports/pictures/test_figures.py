@@ -14,9 +14,13 @@ from pypdf.generic import StreamObject
 
 from reports import contents as contents_module
 from reports.contents import ANGLE, AREA, ISOMETRIC, SEAM, contents
+from reports.pictures import curves as curves_module
 from reports.pictures import figures, galleries, plots
+from reports.pictures.curves import BINS, curves_of
 from reports.pictures.figures import draw, drawings, write
 from reports.pictures.galleries import leading
+from reports.pictures.names import CURVES, map_file
+from reports.pictures.printing import few_colours
 from reports.pictures.style import (
     DARK_INK,
     DARK_PAPER,
@@ -116,8 +120,8 @@ def test_the_closed_models_figure_says_what_cut_it_and_why_a_map_is_missing(suit
     assert not any("hand-made" in text for text in found)  # nefertiti has no map of its own
 
 
-def test_convergence_draws_the_quality_along_the_way(suite):
-    made = plots.convergence(suite, suite.cases)
+def test_convergence_draws_the_quality_along_the_way(suite, tmp_path):
+    made = plots.convergence(suite, tmp_path, suite.cases)
     panel = next(place for place in made.axes if place.get_title() == HAND)
     lines = {line.get_label(): line for line in panel.get_lines()}
     seconds, angles = lines["SLIM symmetric Dirichlet"].get_data()
@@ -142,14 +146,37 @@ def test_singular_values_of_an_isometry_peak_at_one(tmp_path):
     with writer.store.writing():
         writer.cell(HAND, plane, "lscm", {}, result=flat(plane))
     suite = contents(tmp_path)[0]
-    bins = np.linspace(-5, 5, 81)
-    shares = plots.singular_value_shares(suite, suite.rows[0], bins)
+    shares = curves_of(suite, suite.rows[0], tmp_path).shares
     np.testing.assert_allclose(shares.sum(axis=1), 1)
     for share in shares:
         assert share.max() == pytest.approx(1)
-        assert abs(bins[share.argmax()]) < 0.2
-    line = plots.singular_values(suite, [HAND]).axes[0].get_lines()[0]
+        assert abs(BINS[share.argmax()]) < 0.2
+    line = plots.singular_values(suite, tmp_path, [HAND]).axes[0].get_lines()[0]
     assert abs(line.get_xdata()[line.get_ydata().argmax()]) < 0.2
+
+
+def test_what_lies_beside_the_pictures_is_not_measured_again(reported, monkeypatch):
+    pictures = reported / "report" / "figures" / "paper" / "pictures"
+    suite = contents(reported)[0]
+    rows = [row for row in suite.rows if row.status == "ok"]
+    measured = [curves_of(suite, row, pictures / "none") for row in rows]
+    monkeypatch.setattr(curves_module, "Map", None)
+    for row, known in zip(rows, measured, strict=True):
+        for one, other in zip(curves_of(suite, row, pictures), known, strict=True):
+            np.testing.assert_array_equal(one, other)
+    for draw_one in (plots.convergence, plots.area_convergence, plots.singular_values):
+        assert draw_one(suite, pictures, suite.cases) is not None
+
+
+@pytest.mark.parametrize(
+    "kept", ["", "[]", "{}", '{"way": 1, "shares": []}', '{"way": [], "shares": [[1]]}']
+)
+def test_what_is_no_curve_is_measured(suite, tmp_path, kept):
+    row = suite.shown(HAND, suite.methods[0])
+    (tmp_path / map_file(row, CURVES)).write_text(kept)
+    found = curves_of(suite, row, tmp_path)
+    assert len(found.way) == 3
+    assert found.shares.shape == (2, len(BINS) - 1)
 
 
 def test_every_method_looks_different(suite):
@@ -345,7 +372,7 @@ def test_a_figure_for_dark_pages_turns_greys_and_keeps_colours(tmp_path):
     np.testing.assert_allclose(shown.get_facecolor()[0], to_rgba(DARK_PAPER))
     np.testing.assert_allclose(shown.get_facecolor()[1], to_rgba(DARK_INK, 0.5))
     with mpl.rc_context(STYLE):
-        figures.few_colours(made, DARK_PAPER, tmp_path / "dark.png")
+        few_colours(made, DARK_PAPER, tmp_path / "dark.png")
     with Images.open(tmp_path / "dark.png") as image:
         assert image.convert("RGB").getpixel((0, 0)) == (0x1D, 0x20, 0x25)
 
