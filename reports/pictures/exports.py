@@ -58,12 +58,12 @@ def write(contents: Contents, report: Path, progress: Progress = QUIET) -> list[
         if known.get(row.id) != key or len(written(report, row)) < len(KINDS):
             try:
                 surface, result = contents.store.surface(row), contents.store.result(row)
+                if not isinstance(surface, Mesh) or not isinstance(result, Parameterization):
+                    continue  # a cloud has no faces for a texture
+                textured(_stem(report, row), surface, result)
             except InputError as error:
                 faults.append(f"{row.case}, {row.method}: no export: {error}")
                 continue
-            if not isinstance(surface, Mesh) or not isinstance(result, Parameterization):
-                continue  # a cloud has no faces for a texture
-            textured(_stem(report, row), surface, result)
         keys[row.id] = key
     write_text(record, json.dumps(keys, indent=0, sort_keys=True) + "\n")
     return faults
@@ -73,16 +73,19 @@ def textured(stem: Path, mesh: Mesh, parameterization: Parameterization) -> None
     """Write `stem`.obj (with .mtl and .png) and `stem`.glb: the mesh under a checkerboard.
 
     The map is as it was measured, moved and scaled into the unit square, so that the same board
-    fits all methods.
+    fits all methods. Corners that it leaves out lie in a corner of the square.
 
     Raises:
-        InputError: the map is not one of this mesh.
+        InputError: the map is not one of this mesh, or covers none of it.
     """
     stem.parent.mkdir(parents=True, exist_ok=True)
-    uv = parameterization.uv
-    used = uv[np.unique(parameterization.corners)]
+    uv, covered = parameterization.uv, parameterization.covered
+    if not covered.any():
+        raise InputError("the map covers no face: every uv is NaN")
+    used = uv[np.unique(parameterization.corners[covered])]
     side = float(np.ptp(used, axis=0).max()) or 1.0
-    fitted = Parameterization((uv - used.min(axis=0)) / side, parameterization.corners)
+    known = np.nan_to_num((uv - used.min(axis=0)) / side)
+    fitted = Parameterization(known, parameterization.corners)
     texture = checkerboard()
     write_obj(stem.with_name(f"{stem.name}.obj"), mesh, fitted, texture)
     with complete_file(stem.with_name(f"{stem.name}.glb")) as file:

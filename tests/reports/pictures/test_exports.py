@@ -3,7 +3,9 @@ import pymeshlab
 import pytest
 import trimesh
 
+from parapoint.errors import InputError
 from parapoint.files.reading import read_parameterized
+from parapoint.surfaces.parameterization import Parameterization
 from parapoint.testing import similar
 from reports.contents import contents
 from reports.pictures import exports
@@ -34,6 +36,29 @@ def test_other_programs_read_the_exports_back(tmp_path, mesh, result):
     found = lab.current_mesh().wedge_tex_coord_matrix().reshape(-1, 3, 2)
     np.testing.assert_allclose(found, expected, atol=1e-6)
     assert lab.current_mesh().texture_number() == 1
+
+
+def test_what_a_map_leaves_out_lies_in_a_corner_of_the_texture(tmp_path):
+    mesh = sheet()
+    uv = np.where(mesh.vertices[:, :1] > 0.5, np.nan, flat(mesh).uv)
+    region = Parameterization(uv, mesh.faces)
+    exports.textured(tmp_path / "map", mesh, region)
+    _, read = read_parameterized(tmp_path / "map.obj")
+    covered = region.covered
+    kept = uv[mesh.faces][covered]
+    expected = (kept - kept.min(axis=(0, 1))) / np.ptp(kept, axis=(0, 1)).max()
+    np.testing.assert_allclose(read.uv[read.corners][covered], expected, atol=1e-15)
+    left = read.uv[read.corners][~covered][np.isnan(uv[mesh.faces][~covered])]
+    assert (left == 0).all()
+
+
+def test_a_map_of_no_face_is_not_exported(tmp_path):
+    mesh = sheet()
+    with pytest.raises(InputError, match="covers no face"):
+        exports.textured(
+            tmp_path / "map", mesh, Parameterization(np.full((81, 2), np.nan), mesh.faces)
+        )
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(("shift", "scale"), [(6e6, 1), (0, 1e-6), (6e6, 1e-6)])
