@@ -30,6 +30,8 @@ ANGLE, AREA = "angle_difference_mean", "area_discrepancy_total"
 FLIPPED, SPANNING = "flipped_fraction", "spanning_fraction"
 FLIPPED_OFF_SEAM = f"{FLIPPED}_without_spanning"
 WORST_PART = "part_area_ratio_min_without_spanning"
+WHOLE = 0.95
+"""Share of a surface that a map must cover to be ranked among maps of the whole."""
 SHEETS = 12
 """Most models of a report in which each has figures of its own, and all pictures for them."""
 ISOMETRIC = "symmetric_dirichlet"
@@ -50,7 +52,12 @@ DISPLAY: dict[str, tuple[str, str]] = {
     "smith_schaefer": ("Smith and Schaefer", "symmetric Dirichlet, one to one"),
     "geometry_image": ("Geometry image", "least stretch on a square"),
     "xatlas": ("xatlas", "many charts"),
+    "uvatlas": ("UVAtlas", "many charts"),
     "uvunwrap": ("uvunwrap", "many charts"),
+    "blender_angle_based": ("Blender angle-based", "angles nearest to those in space"),
+    "blender_conformal": ("Blender conformal", "linear conformal energy"),
+    "blender_minimum_stretch": ("Blender minimum stretch", "symmetric Dirichlet"),
+    "blender_smart_project": ("Blender smart project", "many charts"),
     "meshlab_lscm": ("MeshLab LSCM", "linear conformal energy"),
     "meshlab_harmonic": ("MeshLab harmonic", "cotangent weights"),
     "meshlab_voronoi": ("MeshLab Voronoi atlas", "many charts"),
@@ -68,6 +75,7 @@ DISPLAY: dict[str, tuple[str, str]] = {
     "reggeonet": ("RegGeoNet", ""),
     "nsm": ("Neural Surface Maps", ""),
     "fam": ("FAM", ""),
+    "nuvo": ("Nuvo", ""),
     "artist+slim": ("Artist's cut + SLIM", ""),
     "seamster": ("Seamster + SLIM", ""),
     "da_wand": ("DA-Wand", "a region around a triangle"),
@@ -169,6 +177,14 @@ def _told(rows: Sequence[ResultRow], name: str) -> str:
     return " / ".join(_words(name, value) for value in values)
 
 
+def _in_print(method: str, params: Mapping[str, Any], submitted: str | None) -> tuple[str, str]:
+    """The name in print, and what stands in its detail whatever the parameters are."""
+    if submitted is not None:
+        return submitted, "submitted maps"
+    preset = f"{method}(preset={params.get('preset')})"
+    return DISPLAY.get(preset, DISPLAY.get(method, (method, "")))
+
+
 def labels(rows: Iterable[ResultRow]) -> dict[tuple[str, str], Label]:
     """The label of each (method, params) in `rows`, in the order of the tables."""
     by_key: dict[tuple[str, str], list[ResultRow]] = {}
@@ -179,14 +195,12 @@ def labels(rows: Iterable[ResultRow]) -> dict[tuple[str, str], Label]:
         key: {n: v for n, v in by_key[key][0].params.items() if n != "device"} for key in keys
     }
     submitted = {key: str(params[key].pop("name", "")) for key in keys if key[0] == SUBMITTED}
+    in_print = {key: _in_print(key[0], params[key], submitted.get(key)) for key in keys}
     found: dict[tuple[str, str], Label] = {}
     for key in keys:
         method = key[0]
-        preset = params[key].get("preset")
-        name, fixed = DISPLAY.get(f"{method}(preset={preset})", DISPLAY.get(method, (method, "")))
-        if method == SUBMITTED:
-            name, fixed = submitted[key], "submitted maps"
-        siblings = [params[other] for other in keys if other[0] == method and other != key]
+        name, fixed = in_print[key]
+        siblings = [params[other] for other in keys if in_print[other] == in_print[key] != key]
         differing = [
             entry
             for entry, value in params[key].items()
@@ -194,7 +208,7 @@ def labels(rows: Iterable[ResultRow]) -> dict[tuple[str, str], Label]:
         ]
         told = [_told(by_key[key], entry) for entry in dict.fromkeys([*TOLD, *differing])]
         short, rivals = name, siblings
-        for entry in differing:
+        for entry in sorted(differing, key=lambda entry: entry != "charts"):  # which tell most
             fewer = [other for other in rivals if other.get(entry) == params[key][entry]]
             if len(fewer) < len(rivals):
                 short = f"{short} {_words(entry, params[key][entry])}".rstrip()
@@ -313,6 +327,18 @@ class Contents:
         many = charts.gt(3 * charts.min(axis=1).clip(lower=1), axis=0).where(charts.notna())
         share = many.mean()
         return frozenset(str(name) for name in share.index[share > 1 / 2])
+
+    @cached_property
+    def partial(self) -> frozenset[str]:
+        """Short names of the methods that map only a part of most surfaces: no rivals, either."""
+        covered = self.means.pivot_table(index="case", columns="label", values="coverage")
+        share = covered.lt(WHOLE).where(covered.notna()).mean()
+        return frozenset(str(name) for name in share.index[share > 1 / 2])
+
+    @property
+    def unranked(self) -> frozenset[str]:
+        """Short names of the methods that do not give one map of the whole surface."""
+        return self.atlases | self.partial
 
     @cached_property
     def means(self) -> pd.DataFrame:

@@ -107,9 +107,12 @@ def _method(contents: Contents, label: Label) -> dict[str, object]:
     bad = [row for row in rows if row.status != "ok"]
     counts = Counter(row.status.replace("_", " ") for row in bad)
     atlas = label.short in contents.atlases
+    detail = "many charts, not ranked" if atlas else label.detail
+    if label.short in contents.partial:
+        detail = "a part of the surface, not ranked"
     return {
         "name": label.short,
-        "detail": "many charts, not ranked" if atlas else label.detail,
+        "detail": detail,
         "charts": "many" if atlas else "one",
         "input": label.input,
         "ok": f"{len(rows) - len(bad)}/{len(rows)}",
@@ -137,7 +140,7 @@ def _summary(contents: Contents, metric: str, name: str, over: str) -> list[Entr
         grades = [record["grade"] for record in records if record and record["ok"]]
         values.append(statistic(name, own, column.better))
         fit.append(
-            label.short not in contents.atlases and means_may_rank(grades, angles=column.angles)
+            label.short not in contents.unranked and means_may_rank(grades, angles=column.angles)
         )
     return _marked(column, values, fit)
 
@@ -149,7 +152,7 @@ def _maps(contents: Contents, case: str, names: Sequence[str]) -> list[dict[str,
     for metric in names:
         column = metric_column(metric)
         fit = [
-            label.short not in contents.atlases
+            label.short not in contents.unranked
             and record is not None
             and may_rank(record["grade"], angles=column.angles)
             for label, record in zip(contents.methods, records, strict=True)

@@ -216,8 +216,9 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
             "pareto",
             "Angles against areas",
             "Angle difference (over all faces) against area discrepancy; the grey steps join what "
-            "no other method with one chart beats in both. Hollow: many charts; pale: broken or "
-            "collapsed, so not on the steps. A map may buy the one with the other.",
+            "no other method with one chart beats in both. Hollow: many charts, or a part of the "
+            "surface; pale: broken or collapsed, so not on the steps. A map may buy the one with "
+            "the other.",
             make=partial(pareto, contents),
             cases=cases,
             size=PANELS,
@@ -227,7 +228,8 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
             "Energy against seams",
             "Symmetric Dirichlet energy (4 for an isometry; 20 stands for all above) against the "
             "length of the seam over the root of the area, of each model that some map cuts. "
-            "Hollow: many charts; pale: broken or collapsed. A longer seam buys less distortion.",
+            "Hollow: many charts, or a part of the surface; pale: broken or collapsed. A longer "
+            "seam buys less distortion.",
             make=partial(seams, contents),
             cases=meshes,
             size=PANELS,

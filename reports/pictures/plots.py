@@ -169,12 +169,12 @@ def pareto(contents: Contents, cases: Sequence[str]) -> Figure | None:
 
 
 def _mark(place: Axes, contents: Contents, points: pd.DataFrame, x: str, y: str) -> None:
-    """A marker for each method: hollow for many charts, pale where it is not `fit`."""
+    """A marker for each method: hollow without a map of the whole, pale where it is not `fit`."""
     for label in contents.methods:
         if label.short in points.index:
             style = look(contents, label) | {"linestyle": "none"}
             style["markersize"] = 10 if style["marker"] == "*" else 6.5
-            if label.short in contents.atlases:
+            if label.short in contents.unranked:
                 style |= {"markerfacecolor": "none", "markeredgecolor": style["color"]}
             else:
                 style |= {"markeredgecolor": "white", "markeredgewidth": 0.5}
@@ -234,7 +234,7 @@ def pareto_front(contents: Contents, points: pd.DataFrame) -> FloatArray:
 
     Broken and collapsed maps take no part. By rising area; of one area there is one point.
     """
-    rivals = points[points["fit"] & ~points.index.isin(contents.atlases)]
+    rivals = points[points["fit"] & ~points.index.isin(contents.unranked)]
     values = rivals.sort_values([AREA, ANGLE])[[AREA, ANGLE]].to_numpy(dtype=np.float64)
     before = np.concatenate([[np.inf], np.minimum.accumulate(values[:, 1])[:-1]])[: len(values)]
     return np.asarray(values[values[:, 1] < before])

@@ -147,7 +147,7 @@ def means_by_kind(contents: Contents) -> Table:
             DONE,
         ),
         blocks=tuple(blocks),
-        set_apart=contents.atlases,
+        set_apart=contents.unranked,
         notes=(
             legend(contents),
             *method_notes(contents),

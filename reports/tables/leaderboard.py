@@ -83,7 +83,7 @@ def winner(contents: Contents, case: str, metric: str) -> Winner | None:
 def _by_case(contents: Contents) -> dict[str, list[dict[str, Any]]]:
     """The rows of `contents.means` with a map of one chart, model by model."""
     means = contents.means
-    rivals = means[(means["ok"] > 0) & ~means["label"].isin(contents.atlases)]
+    rivals = means[(means["ok"] > 0) & ~means["label"].isin(contents.unranked)]
     found: dict[str, list[dict[str, Any]]] = {}
     for record in rivals.to_dict("records"):
         found.setdefault(record["case"], []).append({str(k): v for k, v in record.items()})

@@ -78,7 +78,7 @@ def methods(contents: Contents) -> Table:
         ),
         columns=tuple(columns),
         blocks=(tuple(rows),),
-        set_apart=contents.atlases,
+        set_apart=contents.unranked,
         notes=(
             *method_notes(contents),
             *failure_notes(contents),

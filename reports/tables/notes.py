@@ -83,6 +83,11 @@ def method_notes(contents: Contents) -> list[str]:
             f"Not ranked: {', '.join(sorted(contents.atlases))}, which cut the surface into many "
             "charts; the others give one map of the whole."
         )
+    if contents.partial:
+        notes.append(
+            f"Not ranked: {', '.join(sorted(contents.partial))}, which map a part of the surface "
+            "alone."
+        )
     steps: dict[str, set[str]] = {}
     for row in contents.rows:
         if row.preprocessing:

@@ -105,7 +105,7 @@ class Share(NamedTuple):
 
 def shares(contents: Contents) -> list[Share]:
     """The share of each method with one chart, best first; none where there are fewer than two."""
-    own = [n for n, label in enumerate(contents.methods) if label.short not in contents.atlases]
+    own = [n for n, label in enumerate(contents.methods) if label.short not in contents.unranked]
     if len(own) < 2:
         return []
     won = np.mean([halves(contents, name) for name in COUNTED], axis=0)[:, own][:, :, own] / WON

@@ -69,7 +69,7 @@ def holm(values: Floats) -> Floats:
 
 def paired_tests(contents: Contents) -> Table | None:
     """Every two methods with one chart, over the models both can do; None without five of them."""
-    able = [label for label in contents.methods if label.short not in contents.atlases]
+    able = [label for label in contents.methods if label.short not in contents.unranked]
     pairs = list(itertools.combinations(able, 2))
     tests = {
         metric: [_pair(contents, one, two, metric) for one, two in pairs]

@@ -122,7 +122,7 @@ def conformality(contents: Contents) -> Table | None:
         columns=tuple(columns),
         blocks=(tuple(rows),),
         across=True,
-        set_apart=contents.atlases,
+        set_apart=contents.unranked,
         notes=(
             legend(contents),
             *grade_notes(contents),
@@ -225,7 +225,7 @@ def supplement(contents: Contents) -> Table | None:
         ),
         columns=tuple(columns),
         blocks=tuple(blocks),
-        set_apart=contents.atlases,
+        set_apart=contents.unranked,
         notes=(
             f"Grades: {BOUNDS}.",
             *grade_notes(contents),
@@ -300,7 +300,7 @@ def comparison(contents: Contents, names: Sequence[str] = ()) -> Table:
             Column("skipped", "skipped", digits=0),
         ),
         blocks=tuple(blocks),
-        set_apart=contents.atlases,
+        set_apart=contents.unranked,
         notes=(
             *([f"Not defined on all models: {', '.join(fewer)}."] if fewer else []),
             *method_notes(contents),

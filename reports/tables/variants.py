@@ -99,7 +99,7 @@ def cuts(contents: Contents) -> Table | None:
             DONE,
         ),
         blocks=tuple(blocks),
-        set_apart=contents.atlases.union(lengths),
+        set_apart=contents.unranked.union(lengths),
         notes=(*method_notes(contents), *failure_notes(contents), environment_note(contents)),
     )
 

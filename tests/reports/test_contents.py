@@ -1,4 +1,5 @@
 import dataclasses
+import math
 
 import pytest
 
@@ -155,3 +156,37 @@ def test_mixed_versions_of_a_suite_are_said(tmp_path):
     (note,) = version_notes(suite)
     assert "1 of version 0 (hash0), 1 of version 1 (hash1)" in note
     assert not version_notes(dataclasses.replace(suite, rows=suite.rows[:1]))
+
+
+@pytest.mark.parametrize(("left_out", "partial"), [(0.03, set()), (0.5, {"DA-Wand"})])
+def test_maps_of_a_part_are_no_rivals_of_maps_of_the_whole(tmp_path, left_out, partial):
+    mesh = sheet()
+    whole = flat(mesh)
+    uv, corners = whole.uv[whole.corners].reshape(-1, 2), range_corners(len(mesh.faces))
+    uv[: 3 * math.ceil(left_out * len(mesh.faces))] = math.nan
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        writer.cell(HAND, mesh, "lscm", {}, result=whole)
+        writer.cell(HAND, mesh, "da_wand", {}, result=type(whole)(uv, corners))
+    suite = contents(tmp_path)[0]
+    assert suite.partial == partial
+    assert suite.unranked >= partial
+
+
+def test_names_do_not_repeat_what_tells_them_apart_already(tmp_path):
+    few = {"points": 4096, "subset": 256, "charts": 1}
+    found = labels(
+        rows(
+            tmp_path,
+            ("parapoint", {"preset": "paper", "time_budget": 60}, {}),
+            ("parapoint", {"preset": "learned", "time_budget": 60}, {}),
+            ("nuvo", few, {}),
+            ("nuvo", {"points": None, "subset": None, "charts": 4}, {}),
+        )
+    )
+    assert {label.short for label in found.values()} == {
+        "ParaPoint",
+        "ParaPoint, our training",
+        "Nuvo 1 chart",
+        "Nuvo 4 charts",
+    }

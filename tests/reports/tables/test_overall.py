@@ -32,7 +32,7 @@ def suite(**methods):
             if one is not None
         },
         clouds=frozenset(),
-        atlases=frozenset(),
+        unranked=frozenset(),
     )
 
 
@@ -126,9 +126,9 @@ def test_a_place_needs_an_interval_wholly_above():
 
 def test_methods_with_many_charts_take_no_part():
     made = suite(a=[record()], b=[record(angle=0.2)], many=[record(angle=0, area=0)])
-    made.atlases = frozenset({"many"})
+    made.unranked = frozenset({"many"})
     assert [one.method for one in shares(made)] == ["a", "b"]
-    made.atlases = frozenset({"many", "b"})
+    made.unranked = frozenset({"many", "b"})
     assert shares(made) == []
 
 
