@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from typing import TypeVar
 
 from benchmarks.running.limits import end_with
@@ -36,7 +36,8 @@ def done_by_several(
         for arguments in work:
             yield make(*arguments)
         return
-    with pool:
+    others = set(active_children())
+    try:
         for pending in [pool.submit(make, *arguments) for arguments in work]:
             try:
                 yield pending.result()
@@ -45,6 +46,12 @@ def done_by_several(
                     "a process that draws was killed, perhaps for its memory; the same command "
                     "draws what is missing"
                 ) from None
+    except BaseException:  # what they are at would keep this process for as long as it takes
+        for child in set(active_children()) - others:
+            child.terminate()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 def _begin(parent: int, decoded: float) -> None:
