@@ -213,7 +213,8 @@ def labels(rows: Iterable[ResultRow]) -> dict[tuple[str, str], Label]:
             if len(fewer) < len(rivals):
                 short = f"{short} {_words(entry, params[key][entry])}".rstrip()
                 rivals = fewer
-        detail = ", ".join(part for part in (fixed, *told) if part not in {"", method})
+        new = [part for part in told if part not in {"", method} and part not in fixed]
+        detail = ", ".join(filter(None, [fixed, *new]))
         found[key] = Label(method, key[1], name, detail, short)
     taken: dict[str, int] = {}
     for key, label in found.items():
