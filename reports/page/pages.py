@@ -20,6 +20,7 @@ from parapoint.files.targets import write_text
 from reports.contents import Label
 from reports.page import board, viewer
 from reports.page.sections import Section
+from reports.pictures.galleries import leaves_out
 from reports.pictures.names import VIEWED, model_file, slug
 from reports.tables.leaderboard import MEASURES, definition, page_of
 from reports.tables.table import grouped, metric_column
@@ -116,6 +117,7 @@ def model_page(section: Section, case: str) -> str:
             case=case,
             bounds=BOUNDS,
             about=section.about(case),
+            leaves_out=leaves_out(section.contents, case),
             pages=pages,
             before=pages[at - 1][1] if at else "",
             after=pages[at + 1][1] if at + 1 < len(pages) else "",

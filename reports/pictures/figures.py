@@ -33,6 +33,7 @@ from reports.pictures.galleries import (
     heat_maps,
     is_cut,
     leading,
+    leaves_out,
     maps,
     models,
 )
@@ -124,6 +125,8 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
         "be told; faces that span a learned seam are left pale there and lie below the others."
     )
     cases = contents.cases
+    if any(leaves_out(contents, case) for case in cases):
+        checker += " Grey: faces that a map leaves out."
     meshes = [case for case in cases if case not in contents.clouds]
     whole = [case for case in meshes if not is_cut(contents, case)]
     several = partial(paged, contents)

@@ -120,6 +120,12 @@ def is_cut(contents: Contents, case: str) -> bool:
     return any(CUT in row.preprocessing for row in contents.rows if row.case == case)
 
 
+def leaves_out(contents: Contents, case: str) -> bool:
+    """Whether some map leaves out a part of the model."""
+    own = contents.measured[contents.measured["case"] == case]
+    return bool((own["coverage"] < 1).any())
+
+
 def disks(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure | None:
     """The supplement's figure: SLIM and ParaPoint on models that need no cut."""
     pair = [leading(contents, "slim"), leading(contents, "parapoint")]

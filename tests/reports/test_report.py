@@ -259,3 +259,21 @@ def test_what_to_cite_is_one_file_with_each_entry_once(reported):
     index = (reported / "report" / "index.html").read_text(encoding="utf-8")
     assert 'href="methods.bib"' in index
     assert "Licence: MIT, on libigl (MPL-2.0)" in index
+
+
+def test_a_report_shows_maps_that_leave_faces_out(tmp_path):
+    mesh = sheet()
+    region = np.where(mesh.vertices[:, :1] > 0.5, np.nan, flat(mesh).uv)
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        writer.cell(HAND, mesh, "lscm", {}, result=flat(mesh))
+        writer.cell(HAND, mesh, "da_wand", {}, result=Parameterization(region, mesh.faces))
+        writer.cell("other", mesh, "lscm", {}, result=flat(mesh))
+    index = write(tmp_path, jobs=1)
+    (page,) = (index.parent / "models").rglob("hand*.html")
+    assert "left out by the map" in parsed(page).text
+    assert len(list(index.parent.rglob("*.da-wand*.webp"))) == 7
+    (other,) = (index.parent / "models").rglob("other.html")
+    assert "left out by the map" not in parsed(other).text
+    (captions,) = index.parent.rglob("captions.md")
+    assert "Grey: faces that a map leaves out." in captions.read_text()
