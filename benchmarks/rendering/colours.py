@@ -38,19 +38,25 @@ def averaged(shape: tuple[int, int], samples: int, sample: IntArray, colours: Fl
     not name is clear.
     """
     height, width = shape
-    grid = np.zeros((height * samples * width * samples, 4), dtype=np.float32)
-    grid[sample, :3] = np.minimum(colours, 1)
-    grid[sample, 3] = 1
-    blocks = grid.reshape(height, samples, width, samples, 4)
-    pixels = np.zeros((height, width, 4), dtype=np.float32)
-    for row in range(samples):
-        for column in range(samples):
-            pixels += blocks[:, row, :, column]
-    pixels /= samples**2
-    cover = pixels[..., 3:]
-    pixels[..., :3] /= np.where(cover > 0, cover, 1)
-    levels = np.round(255 * np.concatenate([_srgb(pixels[..., :3]), cover], axis=2))
-    return np.asarray(levels, dtype=np.uint8)
+    row, column = np.divmod(sample, width * samples)
+    pixel = row // samples * width + column // samples
+    shown = np.zeros(height * width, dtype=np.bool_)
+    shown[pixel] = True
+    place = np.cumsum(shown) - 1
+    grid = np.zeros((samples**2, int(shown.sum()), 4), dtype=np.float32)
+    at = (row % samples * samples + column % samples) * grid.shape[1] + place[pixel]
+    flat = grid.reshape(-1, 4)
+    flat[at, :3] = np.minimum(colours, 1)
+    flat[at, 3] = 1
+    means = np.zeros(grid.shape[1:], dtype=np.float32)
+    for layer in grid:
+        means += layer
+    means /= samples**2
+    cover = means[:, 3:]
+    image = np.zeros((height * width, 4), dtype=np.uint8)
+    means[:, :3] /= cover
+    image[shown] = np.round(255 * np.concatenate([_srgb(means[:, :3]), cover], axis=1))
+    return image.reshape(height, width, 4)
 
 
 def _srgb(linear: Floats) -> Floats:

@@ -70,6 +70,7 @@ def draw(contents: Contents, folder: Path, jobs: int, progress: Progress = QUIET
                     todo.append(row)
         if todo:
             work.append((todo, missing))
+    work.sort(key=lambda one: _size(contents.store, one[0]), reverse=True)
     faults: list[str] = []
     wanting = itertools.chain.from_iterable(missing for _, missing in work)
     done = {name: keys[name] for name in keys.keys() - set(wanting)}
@@ -84,6 +85,15 @@ def draw(contents: Contents, folder: Path, jobs: int, progress: Progress = QUIET
         (folder / name).unlink(missing_ok=True)
     _note(record, done)
     return faults
+
+
+def _size(store: Store, rows: Sequence[ResultRow]) -> int:
+    """How much there is to draw: bytes of the model, as often as it is drawn.
+
+    The largest work comes first, lest it be left to one process while the others have none.
+    """
+    path = store.surface_path(rows[0].surface_hash)
+    return len(rows) * path.stat().st_size if path.exists() else 0
 
 
 def _note(record: Path, keys: Mapping[str, str]) -> None:

@@ -4,7 +4,9 @@ import shutil
 import numpy as np
 from PIL import Image as Images
 
+from benchmarks.metrics import validity
 from reports.contents import contents
+from reports.pictures import drawing, figures
 from reports.pictures.drawing import draw, known_keys
 from reports.pictures.names import ARTIST_PICTURES, map_file, model_file, slug
 
@@ -34,6 +36,35 @@ def test_pictures_are_drawn_once_and_again_when_something_changed(results, tmp_p
     other = [name for name in files if name.split(".")[0] != files[0].split(".")[0]]
     assert {name: (tmp_path / name).read_bytes() for name in files} == before
     assert all((tmp_path / name).stat().st_mtime_ns == stamps[name] for name in other)
+
+
+def test_the_largest_work_comes_first(results, tmp_path, monkeypatch):
+    suite = contents(results)[0]
+    made = []
+
+    def note(*given):
+        *_, rows, missing = given
+        made.append(len(rows) * suite.store.surface_path(rows[0].surface_hash).stat().st_size)
+        return missing, []
+
+    monkeypatch.setattr(drawing, "draw_model", note)
+    draw(suite, tmp_path, 1)
+    assert len(made) == len(suite.cases)
+    assert made == sorted(made, reverse=True)
+    assert len(set(made)) > 1
+
+
+def test_overlaps_of_a_map_are_found_once_for_a_report(results, tmp_path, monkeypatch):
+    found = []
+    real = validity.overlaps
+    monkeypatch.setattr(validity, "overlaps", lambda *given: found.append(given) or real(*given))
+    suite = contents(results)[0]
+    found.clear()  # of the metrics
+    draw(suite, tmp_path / "pictures", 1)
+    spanning = sum(row.case == NEFERTITI and row.status == "ok" for row in suite.rows)
+    assert len(found) == spanning > 0
+    figures.draw(suite, tmp_path / "pictures", tmp_path, 1)
+    assert len(found) == spanning
 
 
 def test_seams_are_marked(reported):
