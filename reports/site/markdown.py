@@ -13,8 +13,12 @@ from reports.tables import formats
 from reports.tables import suites as tables
 from reports.tables.notes import load_notes, version_notes
 
-TOLD = ("overall", "success", "conformality", "published", "kinds", "cuts", "seeds")
+TOLD = ("methods", "overall", "success", "conformality", "published", "kinds", "cuts", "seeds")
 """Names of the tables on the page, of those that a suite has."""
+LONG = frozenset({"conformality", "cuts"})
+"""Those with a value for every method on every model."""
+FEW = 12
+"""Methods of a suite up to which the page has its LONG tables; the site always has them."""
 MARK = "<!-- Written by `python -m reports markdown`: "
 """How the page begins; a page that does not is not overwritten."""
 
@@ -45,7 +49,8 @@ def write(sources: Sequence[Path], out: Path) -> Path:
 
 def _suite(suite: Contents) -> list[str]:
     """The paragraphs of a suite: its tables, and what must be known of its run."""
-    made = [table for table in tables.tables(suite) if table.name in TOLD]
+    told = set(TOLD) if len(suite.methods) <= FEW else set(TOLD) - LONG
+    made = [table for table in tables.tables(suite) if table.name in told]
     loads = [row.load for row in suite.rows if row.load is not None]
     load = f"Load while cells ran: {min(loads):.1f} to {max(loads):.1f}." if loads else ""
     maps = sum(row.status == "ok" for row in suite.rows)

@@ -125,6 +125,17 @@ def test_a_site_of_nothing_or_in_the_way_or_too_large_is_refused(built, tmp_path
         building.check_size(large)
 
 
+@pytest.mark.parametrize(("few", "told"), [(1, False), (5, True)])
+def test_many_methods_leave_out_the_tables_with_a_value_for_each_map(
+    built, few, told, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(markdown, "FEW", few)
+    place, _ = built
+    text = markdown.write([place / "old"], tmp_path / "RESULTS.md").read_text(encoding="utf-8")
+    assert "### Methods side by side" in text
+    assert ("### Conformality" in text) == told
+
+
 def test_the_page_of_markdown_names_command_commit_machine_and_load(built, tmp_path):
     place, _ = built
     page = markdown.write([place / "old"], tmp_path / "RESULTS.md")
