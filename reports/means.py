@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from reports.contents import Contents, Label, number
+from reports.contents import Contents, number
+from reports.labels import Label
 
 
 def worst_value(values: Sequence[float], better: str) -> float:

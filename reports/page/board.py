@@ -11,9 +11,9 @@ from benchmarks.metrics.metric import GROUPS
 from benchmarks.metrics.table import METRICS
 from reports.contents import (
     Contents,
-    Label,
     number,
 )
+from reports.labels import Label
 from reports.means import STATISTICS, common_cases, common_values, own_values, statistic
 from reports.ranking import TIMES, Mark, flagged, marks, may_rank, means_may_rank
 from reports.tables.leaderboard import SHOWN, definition, page_of

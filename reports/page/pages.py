@@ -17,7 +17,7 @@ from benchmarks.commands.listing import credit
 from benchmarks.metrics.grades import BOUNDS
 from benchmarks.rendering.maps import ANGLE_SCALE, AREA_SCALE
 from parapoint.files.targets import write_text
-from reports.contents import Label
+from reports.labels import Label
 from reports.page import board, viewer
 from reports.page.sections import Section
 from reports.pictures.galleries import leaves_out

@@ -25,10 +25,10 @@ from reports.contents import (
     FLIPPED_OFF_SEAM,
     SHEETS,
     Contents,
-    Label,
     number,
     suite_title,
 )
+from reports.labels import Label
 from reports.pictures import exports
 from reports.pictures.figures import Drawn
 from reports.pictures.names import VIEWED, map_file, model_file, slug

@@ -24,8 +24,8 @@ from reports.contents import (
     POINT_TEARS,
     SPANNING,
     Contents,
-    Label,
 )
+from reports.labels import Label
 from reports.pictures.names import ARTIST_PICTURES, CLOUD_PICTURES, map_file, model_file
 from reports.pictures.style import WIDTH, figure, picture_grid, put, wrapped
 from reports.tables.table import metric_column

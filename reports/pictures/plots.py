@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
 from parapoint.surfaces.surface import FloatArray
-from reports.contents import ANGLE, AREA, ISOMETRIC, SEAM, Contents, Label
+from reports.contents import ANGLE, AREA, ISOMETRIC, SEAM, Contents
+from reports.labels import Label
 from reports.pictures.curves import BINS, curves_of
 from reports.pictures.galleries import leading
 from reports.pictures.style import (

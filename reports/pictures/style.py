@@ -19,7 +19,8 @@ from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from PIL import Image as Images
 
-from reports.contents import Contents, Label
+from reports.contents import Contents
+from reports.labels import Label
 
 STYLE: dict[Any, Any] = {
     "font.family": "STIXGeneral",

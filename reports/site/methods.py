@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.commands.listing import about
-from reports.contents import ANGLE, AREA, FLIPPED, WORST_PART, Label, number
+from reports.contents import ANGLE, AREA, FLIPPED, WORST_PART, number
+from reports.labels import Label
 from reports.page import pages
 from reports.page.sections import Section
 from reports.pictures.names import map_file, slug

@@ -18,7 +18,8 @@ from benchmarks.metrics.table import METRICS
 from reports.ranking import may_rank
 
 if TYPE_CHECKING:
-    from reports.contents import Contents, Label
+    from reports.contents import Contents
+    from reports.labels import Label
 
 METRIC = "angle_difference_mean"
 """The metric of which tables have columns of published figures."""

@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from reports.contents import ANGLE, AREA, Contents, Label, number
+from reports.contents import ANGLE, AREA, Contents, number
+from reports.labels import Label
 from reports.tables.notes import environment_note, failure_notes, method_notes
 from reports.tables.table import CASE, DONE, METHOD, Column, Table, Value
 

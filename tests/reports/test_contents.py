@@ -4,7 +4,8 @@ import math
 import pytest
 
 from parapoint.errors import InputError
-from reports.contents import contents, labels, suite_title
+from reports.contents import contents, suite_title
+from reports.labels import labels
 from reports.tables.notes import version_notes
 
 from .conftest import HAND, Writer, flat, sheet

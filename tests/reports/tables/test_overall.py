@@ -8,7 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from reports.contents import ANGLE, AREA, POINT_ANGLE, POINT_AREA, Label, contents
+from reports.contents import ANGLE, AREA, POINT_ANGLE, POINT_AREA, contents
+from reports.labels import Label
 from reports.tables import overall
 from reports.tables.overall import LOST, SHARED, WON, outcome, place, shares
 

@@ -3,7 +3,8 @@ import dataclasses
 import pytest
 
 from benchmarks.cases.models import registry
-from reports.contents import Label, contents
+from reports.contents import contents
+from reports.labels import Label
 from reports.tables.published import (
     Verdict,
     claim_reason,
