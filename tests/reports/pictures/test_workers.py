@@ -40,7 +40,7 @@ def test_a_worker_that_is_killed_is_one_line() -> None:
 
 
 SLEEPERS = """
-import pathlib, os, time
+import pathlib, os, signal, time
 from reports.pictures.workers import done_by_several
 
 def sleep(folder):
@@ -49,6 +49,7 @@ def sleep(folder):
 
 if __name__ == "__main__":
     import sys
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
     list(done_by_several(sleep, [(sys.argv[1],)] * 3, 2))
 """
 
