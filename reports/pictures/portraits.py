@@ -115,4 +115,4 @@ def save(content: Content, path: Path) -> None:
         write_text(path, viewer.script(path.name, *content))
     else:
         with complete_file(path) as file:
-            Images.fromarray(content).save(file, format="WebP", quality=78, method=4)
+            Images.fromarray(content).save(file, format="WebP", quality=78, method=2)

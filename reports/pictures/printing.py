@@ -34,7 +34,7 @@ def few_colours(made: Figure, paper: str, path: Path) -> None:
     colours.putpalette(levels.reshape(-1).tolist())
     few = whole.quantize(palette=colours, dither=Images.Dither.FLOYDSTEINBERG)
     with complete_file(path) as file:
-        few.save(file, format="PNG", optimize=True, dpi=(dpi, dpi))
+        few.save(file, format="PNG", compress_level=6, dpi=(dpi, dpi))
 
 
 def on_white(picture: Any) -> Any:
@@ -63,7 +63,7 @@ def light(document: IO[bytes]) -> bytes:
             picture.save(content, format="JPEG", quality=JPEG_QUALITY, optimize=True)
             packed, way = content.getvalue(), "/DCTDecode"
         else:
-            packed, way = zlib.compress(stream.get_data()), "/FlateDecode"
+            packed, way = zlib.compress(stream.get_data(), 3), "/FlateDecode"
         stream.set_data(packed)
         stream[NameObject("/Filter")] = NameObject(way)
     content = io.BytesIO()
