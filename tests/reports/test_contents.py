@@ -1,9 +1,11 @@
 import dataclasses
 import math
 
+import numpy as np
 import pytest
 
 from parapoint.errors import InputError
+from parapoint.surfaces.surface import Mesh
 from reports.contents import contents, suite_title
 from reports.labels import labels
 from reports.tables.notes import version_notes
@@ -191,3 +193,18 @@ def test_names_do_not_repeat_what_tells_them_apart_already(tmp_path):
         "Nuvo 1 chart",
         "Nuvo 4 charts",
     }
+
+
+@pytest.mark.parametrize(("charts", "atlases"), [(5.0, set()), (16.0, {"LSCM"})])
+def test_a_chart_for_each_component_is_not_many(charts, atlases, tmp_path):
+    one = sheet()
+    count = len(one.vertices)
+    apart = np.concatenate([one.vertices + np.array([9.0 * n, 0, 0]) for n in range(5)])
+    mesh = Mesh(apart, np.concatenate([one.faces + count * n for n in range(5)]))
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for method in "lscm", "parapoint":
+            writer.cell(HAND, mesh, method, {}, result=flat(mesh))
+    suite = contents(tmp_path)[0]
+    suite.means["chart_count"] = [charts, 1.0]  # a map of points may join what is apart
+    assert suite.atlases == atlases
