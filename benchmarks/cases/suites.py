@@ -263,6 +263,12 @@ SUITES: dict[str, Suite] = {
             field(60),
         ),
         Suite(
+            "field300",
+            "The paper's field: every method on the same models, 300 s each",
+            (*PAPER_CASES, "camelhead"),
+            field(300),
+        ),
+        Suite(
             "hard",
             "The paper's field on defective meshes and on scans, 5 s each: who gives a map",
             members("wild", "scans"),

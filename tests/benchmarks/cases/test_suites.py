@@ -37,6 +37,7 @@ def test_the_suites():
         "cuts",
         "neural",
         "field",
+        "field300",
         "hard",
         "gpu",
         "bake",
@@ -150,9 +151,12 @@ def test_the_field_has_equal_budgets():
     assert len([budget for budget in budgets if budget]) >= 7
     assert SUITES["field"].cases == (*SUITES["paper"].cases, "camelhead")
     assert SUITES["hard"].cases == (*SUITES["wild"].cases, *SUITES["scans"].cases)
-    assert SUITES["hard"].methods == tuple(
-        spec.replace("time_budget=60", "time_budget=5") for spec in SUITES["field"].methods
-    )
+    for name, seconds in ("hard", 5), ("field300", 300):
+        assert SUITES[name].methods == tuple(
+            spec.replace("time_budget=60", f"time_budget={seconds}")
+            for spec in SUITES["field"].methods
+        )
+    assert SUITES["field300"].cases == SUITES["field"].cases
 
 
 def test_a_drawn_seam_is_part_of_what_makes_results_comparable(tmp_path, monkeypatch):
