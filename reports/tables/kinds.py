@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from benchmarks.metrics.grades import BOUNDS
 from reports.contents import (
     ANGLE,
@@ -17,11 +19,21 @@ from reports.contents import (
     Contents,
     number,
 )
+from reports.labels import Label
 from reports.means import common_cases, common_values, statistic
 from reports.ranking import TIMES, means_may_rank
 from reports.tables.notes import environment_note, failure_notes, legend, load_notes, method_notes
 from reports.tables.published import model
-from reports.tables.table import DONE, METHOD, Column, Table, Value, metric_column, short_columns
+from reports.tables.table import (
+    DONE,
+    METHOD,
+    Column,
+    Table,
+    Value,
+    metric_column,
+    share,
+    short_columns,
+)
 
 
 def kind(contents: Contents, case: str) -> str:
@@ -58,11 +70,11 @@ def success(contents: Contents) -> Table:
         for name, cases in groups.items():
             records = [contents.records.get((case, label.short)) for case in cases]
             own = [record for record in records if record is not None]
-            row[f"{name} ok"] = _share(sum(record["ok"] > 0 for record in own), len(own))
+            row[f"{name} ok"] = share(sum(record["ok"] > 0 for record in own), len(own))
             bijective = sum(number(record, BIJECTIVE) == 1 for record in own)
-            row[f"{name} {BIJECTIVE}"] = _share(bijective, len(own))
+            row[f"{name} {BIJECTIVE}"] = share(bijective, len(own))
             usable = sum(record["grade"] == "usable" for record in own)
-            row[f"{name} usable"] = _share(usable, len(own))
+            row[f"{name} usable"] = share(usable, len(own))
         rows.append(row)
     columns = [METHOD]
     for name, cases in groups.items():
@@ -94,16 +106,27 @@ def success(contents: Contents) -> Table:
     )
 
 
-def _share(count: int, of: int) -> str:
-    return f"{count}/{of}" if of else "not run"
-
-
 KIND_METRICS = (
     *(ANGLE, AREA, ISOMETRIC, FLIPPED, OVERLAPPED),
     *(POINT_ANGLE, POINT_AREA, POINT_COLLISIONS, POINT_TEARS),
     *TIMES,
 )
 """The metrics that are told kind by kind."""
+
+
+def means(
+    contents: Contents, label: Label, names: Sequence[str], cases: Sequence[str]
+) -> dict[str, Value]:
+    """The entries of a row: a method's means of metrics over `cases`, and whether they may rank."""
+    records = [contents.records.get((case, label.short)) for case in cases]
+    grades = [record["grade"] for record in records if record]
+    row: dict[str, Value] = {}
+    for name in names:
+        column = metric_column(name)
+        values = common_values(contents, label, name, cases)
+        row[name] = statistic("mean", values, column.better)
+        row[f"grade {name}"] = "" if means_may_rank(grades, angles=column.angles) else "broken"
+    return row
 
 
 def means_by_kind(contents: Contents) -> Table:
@@ -114,22 +137,15 @@ def means_by_kind(contents: Contents) -> Table:
         common = common_cases(contents, cases)
         block = []
         for label in contents.methods:
-            found = {case: contents.records.get((case, label.short)) for case in cases}
-            own = [record for record in found.values() if record is not None]
+            found = [contents.records.get((case, label.short)) for case in cases]
+            own = [record for record in found if record is not None]
             row: dict[str, Value] = {
                 "kind": f"{name}: means over {len(common)} of {len(cases)}",
                 "method": label.short,
                 "label": label.short,
-                "done": _share(sum(record["ok"] > 0 for record in own), len(own)),
+                "done": share(sum(record["ok"] > 0 for record in own), len(own)),
             }
-            for metric in names:
-                values = common_values(contents, label, metric, common)
-                column = metric_column(metric)
-                row[metric] = statistic("mean", values, column.better)
-                grades = [one["grade"] for case, one in found.items() if one and case in common]
-                fit = means_may_rank(grades, angles=column.angles)
-                row[f"grade {metric}"] = "" if fit else "broken"
-            block.append(row)
+            block.append(row | means(contents, label, names, common))
         blocks.append(tuple(block))
     return Table(
         name="kinds",

@@ -12,10 +12,10 @@ from reports.contents import (
     Contents,
     number,
 )
-from reports.means import common_cases, common_values, own_values, statistic
-from reports.ranking import means_may_rank
+from reports.means import common_cases, own_values, statistic
+from reports.tables.kinds import means
 from reports.tables.notes import environment_note, failure_notes, load_notes, method_notes
-from reports.tables.table import METHOD, Column, Table, Value, metric_column, short_columns
+from reports.tables.table import METHOD, Column, Table, Value, share, short_columns
 
 MEANS = (ANGLE, ISOMETRIC, "stretch_l2")
 """The metrics whose means over the common models stand side by side."""
@@ -30,27 +30,22 @@ def methods(contents: Contents) -> Table:
     names = MEANS_OF_CLOUDS if of_clouds else MEANS
     rows = []
     for label in contents.methods:
-        found = {case: contents.records.get((case, label.short)) for case in contents.cases}
-        own = [record for record in found.values() if record is not None]
-        grades = [one["grade"] for case, one in found.items() if one and case in common]
+        found = [contents.records.get((case, label.short)) for case in contents.cases]
+        own = [record for record in found if record is not None]
+        usable = sum(record["grade"] == "usable" for record in own)
+        bijective = sum(number(record, BIJECTIVE) == 1 for record in own)
         row: dict[str, Value] = {
             "method": label.short,
             "label": label.short,
             "input": label.input,
-            "ok": _of(own, sum(record["ok"] > 0 for record in own)),
-            "usable": _of(own, sum(record["grade"] == "usable" for record in own)),
-            "one to one": _of(own, sum(number(record, BIJECTIVE) == 1 for record in own)),
+            "ok": share(sum(record["ok"] > 0 for record in own), len(own)),
+            "usable": share(usable, len(own)),
+            "one to one": share(bijective, len(own)),
             "charts": statistic("median", own_values(contents, label, "chart_count"), ""),
             WORST_PART: statistic("worst", own_values(contents, label, WORST_PART), "higher"),
             "coverage": statistic("mean", own_values(contents, label, "coverage"), ""),
         }
-        for name in names:
-            column = metric_column(name)
-            values = common_values(contents, label, name, common)
-            row[name] = statistic("mean", values, column.better)
-            fit = means_may_rank(grades, angles=column.angles)
-            row[f"grade {name}"] = "" if fit else "broken"
-        rows.append(row)
+        rows.append(row | means(contents, label, names, common))
     columns = [
         METHOD,
         Column("input", "reads", text=True),
@@ -86,7 +81,3 @@ def methods(contents: Contents) -> Table:
             environment_note(contents),
         ),
     )
-
-
-def _of(records: list[dict[str, object]], count: int) -> str:
-    return f"{count}/{len(records)}" if records else "not run"

@@ -181,6 +181,11 @@ def _flagged(text: str, row: Mapping[str, Value], column: Column) -> str:
     return flagged(text, _grade(row, column), angles=column.angles) if known else text
 
 
+def share(count: int, of: int) -> str:
+    """How many of how many, as tables print it."""
+    return f"{count}/{of}" if of else "not run"
+
+
 def grouped(columns: Sequence[Column]) -> list[tuple[str, int]]:
     """The heads over the columns and how many columns each spans."""
     groups: list[tuple[str, int]] = []
