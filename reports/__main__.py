@@ -80,9 +80,10 @@ def site(sources: tuple[Path, ...], out: Path) -> None:
 @click.argument("sources", metavar="DIR...", nargs=-1, required=True, type=PATH)
 @click.option("--out", default="docs/RESULTS.md", show_default=True, type=PATH)
 def markdown(sources: tuple[Path, ...], out: Path) -> None:
-    """Write results as one page of Markdown.
+    """Write results as one page of Markdown, a section for each suite.
 
-    The page names the commit, the machine and its load for each of the folders.
+    A section names the commit, the machine and its load. On a page that is there already the
+    sections of other suites stay.
     """
     from reports.site.markdown import write
 

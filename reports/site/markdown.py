@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import shlex
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -21,30 +21,41 @@ FEW = 12
 """Methods of a suite up to which the page has its LONG tables; the site always has them."""
 MARK = "<!-- Written by `python -m reports markdown`: "
 """How the page begins; a page that does not is not overwritten."""
+ABOUT = (
+    "`python -m reports markdown DIR --out docs/RESULTS.md` renews the sections of the suites in a "
+    "results folder and keeps the others. Each names the commit and the machine of its run. "
+    "Validity comes before rank (METRICS.md, *Grades*)."
+)
+SECTION = re.compile(
+    r"^## [^\n]* \(`([^`\n]+)`\)\n.*?(?=^## [^\n]* \(`[^`\n]+`\)$|\Z)", re.MULTILINE | re.DOTALL
+)
+"""A suite's section on the page; the group is the suite's name."""
 
 
 def write(sources: Sequence[Path], out: Path) -> Path:
-    """Write the page; its path.
+    """Write the page, or renew the sections of some suites on it; its path.
+
+    The sections of other suites stay as they are, since a run of all suites takes a day.
 
     Raises:
         InputError: a folder holds no results; `out` is there and not ours.
     """
-    if out.exists() and not out.read_text(encoding="utf-8", errors="replace").startswith(MARK):
+    before = out.read_text(encoding="utf-8", errors="replace") if out.exists() else MARK
+    if not before.startswith(MARK):
         raise InputError(f"{out}: is in the way and not ours; take another --out")
     suites = [suite for source in sources for suite in contents(source)]
-    command = shlex.join(
-        ["python", "-m", "reports", "markdown", *map(str, sources), "--out", str(out)]
-    )
-    parts = [
-        f"{MARK}change the results, not this page. -->",
-        "# Reference results",
-        f"Made by `{command}`. Validity comes before rank (METRICS.md, *Grades*).",
-        *(part for suite in suites for part in _suite(suite)),
-    ]
+    sections = _sections(before) | {suite.suite: "\n\n".join(_suite(suite)) for suite in suites}
+    parts = [f"{MARK}change the results, not this page. -->", "# Reference results", ABOUT]
+    parts += sections.values()
     out.parent.mkdir(parents=True, exist_ok=True)
     with complete_file(out) as stream:
         stream.write(("\n\n".join(parts) + "\n").encode())
     return out
+
+
+def _sections(page: str) -> dict[str, str]:
+    """The text of each suite's section on a page, by the suite's name."""
+    return {head[1]: head[0].strip() for head in SECTION.finditer(page)}
 
 
 def _suite(suite: Contents) -> list[str]:

@@ -136,11 +136,28 @@ def test_many_methods_leave_out_the_tables_with_a_value_for_each_map(
     assert ("### Conformality" in text) == told
 
 
+def test_the_page_of_markdown_keeps_the_sections_of_other_suites(built, tmp_path):
+    place, _ = built
+    page = markdown.write([place / "old"], tmp_path / "RESULTS.md")
+    alone = page.read_text(encoding="utf-8")
+    (head,) = markdown.SECTION.findall(alone)
+    before, others = (
+        "## First (`first`)\n\n1.\n",
+        "## Last, at (2) (`last`)\n\n### 2\n\n## no suite\n",
+    )
+    beginning, own = alone[: alone.index("## ")], alone[alone.index("## ") :]
+    page.write_text(
+        f"{beginning}{before}\n## Stale (`{head}`)\n\nold\n\n{others}", encoding="utf-8"
+    )
+    markdown.write([place / "old"], page)
+    assert page.read_text(encoding="utf-8") == f"{beginning}{before}\n{own}\n{others}"
+
+
 def test_the_page_of_markdown_names_command_commit_machine_and_load(built, tmp_path):
     place, _ = built
     page = markdown.write([place / "old"], tmp_path / "RESULTS.md")
     text = page.read_text(encoding="utf-8")
-    assert f"python -m reports markdown {place / 'old'} --out {page}" in text
+    assert "python -m reports markdown DIR" in text
     assert "Load while cells ran: 0.5 to 1.5." in text
     assert "commit 0123456789ab, X, 2 cores" in text
     assert "### Overall: share of pairs won" in text
