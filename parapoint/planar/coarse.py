@@ -12,46 +12,37 @@ from scipy.sparse import csgraph
 
 from parapoint.planar.descent import Run
 from parapoint.planar.domains import FlatteningError
+from parapoint.planar.embedding import embeddable
 from parapoint.planar.growth import Need, grown
 from parapoint.surfaces.cutting import cut_along, edge_graph, edge_lengths, path_to
 from parapoint.surfaces.surface import IntArray, Mesh, flat_faces
 
 COARSE = 4_000
 """Faces of the simplified mesh."""
-LARGE = 8_000
-"""Faces from which on a mesh is simplified: below, its own growth takes a few seconds."""
 
 
-def grown_as_coarse(run: Run, need: Need) -> Run:
-    """The map after its seam grew to where that of the simplified mesh did.
+def grown_as_coarse(mesh: Mesh, need: Need, deadline: float) -> tuple[Mesh, tuple[int, ...]]:
+    """The large mesh cut to where the seam of the simplified one grew, and the branches' tips.
 
-    It is the run itself where the simplified mesh tells of no branches, or these do not pay.
+    The mesh stays as it is where the simplified one has no map, or its seam does not grow.
 
     Args:
-        run: the map, settled; it is left as it is.
+        mesh: a planar domain.
         need: what the seam is to bring.
+        deadline: no step begins after this time of `clock.worked`.
     """
-    simple = simplified(run.mesh)
+    simple = simplified(mesh)
     if simple is None:
-        return run
+        return mesh, ()
     coarse, vertex = simple
-    guess = Run(coarse, run.deadline)
+    guess = Run(coarse, deadline)
     try:
         guess.begin()
     except FlatteningError:
-        return run
+        return mesh, ()
     guess.improve()
-    guess = grown(guess, need)
-    if not guess.tips:
-        return run
-    tips = vertex[list(guess.tips)].tolist()
-    longer = Run(joined(run.mesh, tips), run.deadline).held(run.deadline)
-    if longer is None or not run.energy - longer.energy > need.least(
-        run, (longer.rim - run.rim) / 2
-    ):
-        return run
-    longer.tips = (*run.tips, *tips)
-    return longer
+    tips = vertex[list(grown(guess, need).tips)].tolist()
+    return embeddable(joined(mesh, tips)), tuple(tips)
 
 
 def simplified(mesh: Mesh) -> tuple[Mesh, IntArray] | None:

@@ -26,6 +26,12 @@ LEAST_ENERGY = 4.0
 """The energy of an isometry."""
 SETTLED = 1e-3
 """A map is at its best once a step lowers the energy's excess by less than this share of it."""
+LARGE = 8_000
+"""Faces from which on a step takes seconds, and none is taken for what nobody sees."""
+UNSEEN = 1e-4
+"""A large map is at its best, too, once a step lowers the energy, which is 4 at least, by less.
+Where a surface unrolls without distortion, each step takes away a tenth of what is left, however
+little that is: a scroll of 200,000 faces ends at 4.0007 after 15 steps, at 4.0004 after 23."""
 REACH = 10
 """An energy is in sight of a descent that would come there in so many steps like its last one."""
 
@@ -106,13 +112,14 @@ class Run:
         """
         unit = of_area_one(self.mesh.vertices, self.mesh.faces)
         down = free_steps_down if self.is_free else steps_down
+        unseen = UNSEEN if len(self.mesh.faces) > LARGE else 0.0
         for moved in down(unit, self.uv / self.unit, ENERGY, self.deadline):
             uv = self.unit * moved
             before, after = self.energy, self.energy_of(uv)
             if not after < before:
                 return
             self.uv, self.energy = uv, after
-            if before - after < SETTLED * (after - LEAST_ENERGY):
+            if before - after < max(SETTLED * (after - LEAST_ENERGY), unseen):
                 return
             if after - goal > REACH * (before - after):
                 return

@@ -12,6 +12,9 @@ from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, Surface, edge
 
 FEWEST_POINTS = 100
 """Distinct points that a fit needs."""
+SAMPLED_ANEW = 5 * FEWEST_POINTS
+"""Points that are sought on the faces of a mesh where a sample fell short of that: on two sheets
+that lie on one another there is room for 70 of 100."""
 COINCIDENT = 1e-6
 """Points that agree to this, in radii of the surface, count as one."""
 FEWEST_VERTICES = 2_000
@@ -48,6 +51,8 @@ def training_points(surface: Surface, count: int, seed: int) -> FloatArray:
             scaled = Mesh(surface.vertices / unit, surface.faces)
             if scaled.face_areas.sum() > 0:
                 points = even_sample(scaled, count, seed) * unit
+                if len(points) < FEWEST_POINTS:
+                    points = even_sample(scaled, SAMPLED_ANEW, seed) * unit
     else:
         points = surface.points
     if len(points) > 10 * count:

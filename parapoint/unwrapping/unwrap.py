@@ -19,8 +19,8 @@ from parapoint.computed.reconstruction import ReconstructionError
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
 from parapoint.parameters import LONGEST_SECONDS, check_choice, check_number
-from parapoint.planar.coarse import LARGE, grown_as_coarse
-from parapoint.planar.descent import LEAST_ENERGY, Run, sound
+from parapoint.planar.coarse import grown_as_coarse
+from parapoint.planar.descent import LARGE, LEAST_ENERGY, Run, sound
 from parapoint.planar.domains import FlatteningError
 from parapoint.planar.embedding import embeddable
 from parapoint.planar.growth import PRICE, Need, grown
@@ -199,15 +199,17 @@ class Unwrap:
             seam: edges that make a planar domain of it.
             deadline: no step begins after this time of `clock.worked`.
         """
-        run = Run(embeddable(cut_along(mesh, mesh.edges[seam])), deadline)
+        is_large = len(mesh.faces) > LARGE and self.max_distortion is None
+        domain = embeddable(cut_along(mesh, mesh.edges[seam]))
+        tips: tuple[int, ...] = ()
+        if self._grows and is_large:
+            domain, tips = grown_as_coarse(domain, self._need, deadline)
+        run = Run(domain, deadline)
+        run.tips = tips
         run.begin()
         run.improve()
-        if not self._grows:
+        if not self._grows or (is_large and not self._need.of(run)):
             return run
-        if len(mesh.faces) > LARGE and self.max_distortion is None:
-            run = grown_as_coarse(run, self._need)
-            if not self._need.of(run):
-                return run
         return grown(run, self._need)
 
     def _seam(self, mesh: Mesh, seed: int, deadline: float) -> tuple[BoolArray, dict[str, object]]:
@@ -221,7 +223,7 @@ class Unwrap:
             budget = SHARE_OF_SEAM * max(deadline - clock.worked(), LEAST_TIME)
         computed = ComputedMap(points, distortion="conformal", time_budget=budget)
         try:
-            with _unsaid("parapoint.computed.computed_map"):
+            with _unsaid():
                 learned = computed.parameterize(mesh, seed=seed)
         except ReconstructionError as error:
             seam = np.zeros(len(mesh.edges), dtype=bool)
@@ -239,9 +241,9 @@ class Unwrap:
 
 
 @contextlib.contextmanager
-def _unsaid(module: str) -> Iterator[None]:
-    """Leave unsaid what a module warns of: here of points that nobody but us has drawn."""
-    logger = logging.getLogger(module)
+def _unsaid() -> Iterator[None]:
+    """Leave warnings unsaid: they would be of points that nobody but us has drawn."""
+    logger = logging.getLogger("parapoint")
     before, logger.disabled = logger.disabled, True
     try:
         yield

@@ -1,5 +1,7 @@
 """Growth of the seam of a large mesh to where that of a simplified one grew."""
 
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from benchmarks.metrics.evaluation import evaluate
 from parapoint.planar import coarse
 from parapoint.planar.coarse import grown_as_coarse, joined, simplified
 from parapoint.planar.descent import Run
+from parapoint.planar.domains import FlatteningError
 from parapoint.planar.growth import Need, grown
 from parapoint.surfaces.parameterization import Parameterization
 
@@ -38,14 +41,32 @@ def test_the_seam_grows_to_where_that_of_the_simplified_mesh_did() -> None:
     run.improve()
     need = Need(1e9)
     assert need.of(run)
-    longer, slow = grown_as_coarse(run, need), grown(run, need)
-    assert longer.branches >= 1
+    domain, tips = grown_as_coarse(mesh, need, np.inf)
+    assert len(tips) >= 1
+    longer, slow = Run(domain), grown(run, need)
+    longer.begin()
+    longer.improve()
     assert not need.of(longer)
     assert longer.energy < 1.2 * slow.energy
     assert longer.rim - run.rim < 1.3 * (slow.rim - run.rim)
-    found = evaluate(mesh, Parameterization(longer.uv, longer.mesh.faces))
+    found = evaluate(mesh, Parameterization(longer.uv, domain.faces))
     assert found["flipped_fraction"] == found["overlap_area"] == 0
-    assert grown_as_coarse(longer, Need(1e9)) is longer
+    assert grown_as_coarse(domain, need, np.inf) == (domain, ())
+
+
+@pytest.mark.usefixtures("few")
+@pytest.mark.parametrize("lacks", ["mesh", "map", "branches"])
+def test_the_mesh_stays_as_it_is_where_the_simplified_one_tells_nothing(lacks, monkeypatch) -> None:
+    mesh = builtin.finger()
+    if lacks == "mesh":
+        monkeypatch.setattr(coarse, "simplified", lambda _: None)
+    elif lacks == "map":
+        monkeypatch.setattr(Run, "begin", Mock(side_effect=FlatteningError("no start")))
+    else:
+        monkeypatch.setattr(coarse, "grown", lambda run, _: run)
+    kept, tips = grown_as_coarse(mesh, Need(1e9), np.inf)
+    assert tips == ()
+    assert (kept.faces == mesh.faces).all()
 
 
 def test_branches_are_joined_to_the_seam_by_short_paths() -> None:

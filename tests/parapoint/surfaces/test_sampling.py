@@ -39,6 +39,15 @@ def test_training_points_of_a_mesh_come_from_the_vertices_of_its_faces() -> None
     assert not np.array_equal(training_points(soup, 500, 1), drawn)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_a_mesh_of_few_faces_gives_as_many_points_as_a_fit_needs(seed) -> None:
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])
+    sides = [np.column_stack([square, np.full(4, z)]) for z in (0.0, 1e-4)]
+    plate = Mesh(np.concatenate(sides), [[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6]])
+    assert len(even_sample(plate, 100, seed)) < 100
+    assert len(training_points(plate, 100, seed)) == 100
+
+
 def test_points_of_faces_are_added_where_the_vertices_do_not_show_the_shape() -> None:
     disk = irregular_disk()  # 81 vertices
     points = training_points(disk, 150, 0)

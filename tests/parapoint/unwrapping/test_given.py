@@ -1,6 +1,5 @@
 """Maps along seams that are given."""
 
-import logging
 
 import numpy as np
 import pytest
@@ -55,14 +54,14 @@ def test_what_is_said_of_points_that_nobody_gave_stays_unsaid(monkeypatch, caplo
     """A closed mesh is opened along a map of points that are drawn from it."""
 
     def parameterize(*_, **__):
-        logging.getLogger(computed_map.__name__).warning("30 of 6000 points are off")
+        computed_map.logger.warning("30 of 6000 points are off")
         raise ReconstructionError("no surface")
 
     monkeypatch.setattr(computed_map.ComputedMap, "parameterize", parameterize)
     result = Unwrap(time_budget=5).parameterize(sphere(), seed=0)
     assert len(result.uv) > 0
     assert not caplog.records
-    logging.getLogger(computed_map.__name__).warning("heard again")
+    computed_map.logger.warning("heard again")
     assert [record.message for record in caplog.records] == ["heard again"]
 
 
