@@ -76,6 +76,7 @@ class NSM(NeuralMethod):
 
         from baselines.neural import nsm_training as of
         from baselines.neural.nsm_networks import Refinement, SurfaceMap
+        from baselines.neural.nsm_samples import Triangles
         from baselines.neural.stepping import trained
 
         if not isinstance(surface, Mesh):
@@ -86,7 +87,7 @@ class NSM(NeuralMethod):
         unit = float(np.ptp(uv, axis=0).max()) / EXTENT
         inside = (uv - (uv.min(axis=0) + uv.max(axis=0)) / 2) / unit
         solid = (flat.mesh.vertices - flat.mesh.vertices.mean(axis=0)) / unit
-        triangles = of.Triangles(*(torch.as_tensor(at[corners]) for at in (inside, solid)))
+        triangles = Triangles(*(torch.as_tensor(at[corners]) for at in (inside, solid)))
         generator = torch.Generator().manual_seed(seed)
         fitted, refined = SurfaceMap(generator), Refinement(generator)
         samples = triangles.drawn(self.points, generator)

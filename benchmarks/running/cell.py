@@ -25,7 +25,6 @@ import numpy as np
 
 from baselines import registry
 from benchmarks.running.environment import load
-from benchmarks.running.sharing import sharing
 from benchmarks.running.tasks import Job, MeasureJob, Outcome, Prepared, RunJob, from_json, to_json
 from benchmarks.store.archives import (
     arrays_hash,
@@ -126,7 +125,7 @@ def run(job: RunJob, send: int) -> Outcome:
             method.preload()
         busy = load()
         before, wall = os.times(), time.perf_counter()
-        maps = preparation.maps(sharing(method, preparation.parts), job.seed)
+        maps = preparation.maps(method, job.seed)
         wall, after = time.perf_counter() - wall, os.times()
     except UnsupportedError as error:
         begins = MISSING if isinstance(error, MissingError) else ""

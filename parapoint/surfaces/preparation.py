@@ -24,12 +24,13 @@ no seam.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import cast
+from dataclasses import dataclass, replace
+from typing import Any, cast
 
 import igl
 import numpy as np
 
+from parapoint import clock
 from parapoint.method import REQUIREMENTS, Method, UnsupportedError
 from parapoint.surfaces.cutting import cut_along, cut_to_disk
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization, TracePoint
@@ -50,6 +51,8 @@ IMPLIED = {
 """What else a word asks for."""
 CUT = "automatic cut to a disk"
 """The step that gives a surface seams which no method chose."""
+LEAST_TIME = 0.01
+"""Seconds that a part of a surface has at least, however little of a time budget is left."""
 GAP = 1 / 256
 """Room between packed components, over the side of a square of all their boxes."""
 
@@ -70,16 +73,25 @@ class Preparation:
     origin: IntArray | None = None
 
     def maps(self, method: Method, seed: int) -> list[Parameterization | PointParameterization]:
-        """The map of each part; an error has a note of its part, where there are several."""
-        found = []
-        for number, part in enumerate(self.parts, start=1):
+        """The map of each part; an error has a note of its part, where there are several.
+
+        Several parts share the method's time budget, if it has one: each gets as much of the time
+        that is left as it has of the faces that are left.
+        """
+        if len(self.parts) == 1:
+            return [method.parameterize(self.parts[0], seed=seed)]
+        meshes = cast("tuple[Mesh, ...]", self.parts)
+        begun, found = clock.worked(), []
+        left = sum(len(part.faces) for part in meshes)
+        for number, part in enumerate(meshes, start=1):
+            share = len(part.faces) / left
             try:
-                found.append(method.parameterize(part, seed=seed))
+                found.append(_sharing(method, share, begun).parameterize(part, seed=seed))
             except Exception as error:
-                if isinstance(part, Mesh) and len(self.parts) > 1:
-                    size = f"{len(part.faces)} face{'s' * (len(part.faces) != 1)}"
-                    error.add_note(f"(component {number} of {len(self.parts)}, {size})")
+                size = f"{len(part.faces)} face{'s' * (len(part.faces) != 1)}"
+                error.add_note(f"(component {number} of {len(meshes)}, {size})")
                 raise
+            left -= len(part.faces)
         return found
 
     def joined(
@@ -106,6 +118,15 @@ class Preparation:
         largest = int(area.argmax())
         report = {"components": len(parts), "largest": dict(charts[largest].report)}
         return Parameterization(uv, corners, _trace(charts, area), report)
+
+
+def _sharing(method: Method, share: float, begun: float) -> Method:
+    """The method with a share of what is left of its time budget, which began to run at `begun`."""
+    budget: float | None = getattr(method, "time_budget", None)
+    if budget is None:
+        return method
+    seconds = max(share * (begun + budget - clock.worked()), LEAST_TIME)
+    return cast("Method", replace(cast("Any", method), time_budget=seconds))
 
 
 def prepared(surface: Surface, requires: frozenset[str]) -> Preparation:

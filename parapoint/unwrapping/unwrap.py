@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import logging
 import math
 from collections.abc import Iterator
@@ -29,7 +28,7 @@ from parapoint.surfaces.across_seams import learned_seam
 from parapoint.surfaces.areas import MOST_STARVED
 from parapoint.surfaces.cutting import cut_along, disk_cut
 from parapoint.surfaces.parameterization import Parameterization
-from parapoint.surfaces.preparation import prepared
+from parapoint.surfaces.preparation import LEAST_TIME, prepared
 from parapoint.surfaces.sampling import FEWEST_VERTICES
 from parapoint.surfaces.surface import BoolArray, Mesh, Surface
 
@@ -41,8 +40,6 @@ ENOUGH_POINTS = 6_000
 in 7 s, to 5.63 in 27 s."""
 STEPPING = 0.9
 """Share of a time budget after which no step begins: the last one takes time, too."""
-LEAST_TIME = 0.01
-"""Seconds that a part has at least, however little time is left."""
 SHARE_OF_SEAM = 0.5
 """Share of a time budget in which the computed map, which tells the seam, is to be ready."""
 
@@ -118,17 +115,7 @@ class Unwrap:
             FlatteningError: no start without flips was found.
         """
         preparation = prepared(mesh, self.requires)
-        maps = []
-        left = sum(len(part.faces) for part in preparation.parts if isinstance(part, Mesh))
-        end = math.inf if self.time_budget is None else clock.worked() + self.time_budget
-        for part in preparation.parts:
-            assert isinstance(part, Mesh)
-            method = self
-            if self.time_budget is not None:
-                share = max(end - clock.worked(), 0.0) * len(part.faces) / left
-                method = dataclasses.replace(self, time_budget=max(share, LEAST_TIME))
-            maps.append(method.parameterize(part, seed=seed))
-            left -= len(part.faces)
+        maps = preparation.maps(self, seed)
         joined = preparation.joined(maps)
         assert isinstance(joined, Parameterization)
         report = {"parts": [dict(of.report) for of in maps], "steps": preparation.steps}

@@ -7,9 +7,9 @@ import torch
 from baselines.hybrid import AutomaticSLIM
 from baselines.neural.nsm import NSM
 from baselines.neural.nsm_networks import Refinement, SurfaceMap, with_axes
+from baselines.neural.nsm_samples import Triangles
 from baselines.neural.nsm_training import (
     ROUND,
-    Triangles,
     batches,
     distortion_terms,
     first_forms,

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from parapoint import Mesh, Parameterization, PointCloud
+from parapoint import Mesh, Parameterization, PointCloud, clock
 from parapoint.method import UnsupportedError
 from parapoint.surfaces.parameterization import TracePoint
-from parapoint.surfaces.preparation import prepared, shelves
+from parapoint.surfaces.preparation import Preparation, prepared, shelves
 from parapoint.surfaces.surface import flat_faces
 from parapoint.testing import irregular_disk, sphere
 
@@ -199,6 +199,41 @@ def test_an_error_names_its_component():
     with pytest.raises(ValueError, match="will not") as caught:
         preparation.maps(Shadow(), 4)
     assert caught.value.__notes__ == ["(component 2 of 2, 4 faces)"]
+
+
+@dataclass(frozen=True)
+class Hasty:
+    """Works for half of the seconds that it is given, and maps as `Shadow` does."""
+
+    given: list
+    now: list
+    time_budget: float | None = 12.0
+
+    def parameterize(self, surface, *, seed):
+        self.given.append(self.time_budget)
+        self.now[0] += (self.time_budget or 0) / 2
+        return Shadow().parameterize(surface, seed=seed)
+
+
+@pytest.mark.parametrize(
+    ("budget", "expected"), [(12.0, [4.0, 10.0]), (None, [None, None]), (1e-9, [0.01, 0.01])]
+)
+def test_parts_share_the_time_that_is_left_by_their_faces(budget, expected, monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(clock, "worked", lambda: now[0])
+    given: list[float | None] = []
+    sizes = [4, 8]  # a third of the faces gets 4 of 12 s, and leaves 2 of these to the others
+    disk = irregular_disk()
+    parts = tuple(Mesh(disk.vertices, disk.faces[:size]) for size in sizes)
+    maps = Preparation(parts).maps(Hasty(given, now, budget), 3)
+    assert given == pytest.approx(expected) if budget else given == expected
+    assert [len(of.corners) for of in maps] == sizes
+
+
+def test_one_part_has_all_of_the_time():
+    given: list[float | None] = []
+    Preparation((irregular_disk(),)).maps(Hasty(given, [0.0]), 3)
+    assert given == [12.0]
 
 
 @pytest.mark.parametrize("seed", range(40))

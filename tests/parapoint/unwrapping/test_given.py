@@ -1,6 +1,5 @@
 """Maps along seams that are given."""
 
-
 import numpy as np
 import pytest
 
