@@ -59,6 +59,15 @@ def test_the_region_is_a_disk_around_its_seed_within_the_bound(triangle, bound):
     assert 12 < len(faces) < len(mesh.faces)
 
 
+def test_after_a_ring_too_many_the_next_ones_are_half_as_large_and_then_twice():
+    """How many maps that takes was counted; rings that grow threefold take 33 and 73."""
+    solves = [
+        DAWand(triangle=117, distortion=bound).parameterize(sphere(), seed=0).report["solves"]
+        for bound in (0.01, 1e-3)
+    ]
+    assert solves == [28, 67]
+
+
 def test_a_higher_bound_takes_more_of_the_surface():
     mesh = sphere()
     shares = [

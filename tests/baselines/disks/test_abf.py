@@ -28,6 +28,7 @@ def test_targets_sum_up_to_a_full_turn_around_inner_vertices_and_stay_elsewhere(
     mesh = bent()
     problem = angles(mesh.vertices, mesh.faces)
     assert problem.wheel.shape == (49, 3 * 128)
+    assert problem.ahead[:6].tolist() == [1, 2, 0, 4, 5, 3]  # the next corner of the same face
     assert_allclose(problem.wheel @ problem.target, 2 * np.pi)
     rim = np.isin(mesh.faces.reshape(-1), mesh.boundary_loops[0])
     kept = igl.internal_angles(mesh.vertices, mesh.faces).reshape(-1)[rim]

@@ -110,6 +110,7 @@ def test_every_step_of_the_trace_is_one_to_one_and_lowers_the_energy():
     result = SmithSchaefer(iterations=60).parameterize(mesh, seed=0)
     values = [point.values["symmetric_dirichlet"] for point in result.trace]
     assert values[-1] < values[0] - 0.5
+    assert values[20] < 4.02  # down the slope alone it comes to 4.2 by then
     assert [point.iteration for point in result.trace] == list(range(len(values)))
     assert values[-1] == result.report["end_energy"]
     assert_array_equal(result.trace[-1].uv, result.uv)

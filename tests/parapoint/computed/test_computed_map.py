@@ -57,6 +57,14 @@ def test_a_saved_model_maps_as_before(computed: ComputedMap, tmp_path) -> None:
     assert loaded.report_ == json.loads(json.dumps(computed.report_))
 
 
+def test_a_map_that_is_no_larger_than_a_point_somewhere_keeps_no_angle_there() -> None:
+    flat = flat_map(paraboloid() / 7, math.inf, "conformal")
+    whole = computed_map._conformality(flat)
+    half = flat._replace(jacobians=flat.jacobians * (np.arange(400) % 2)[:, None, None])
+    assert 0.9 < whole <= 1
+    assert computed_map._conformality(half) == pytest.approx(whole / 2, abs=0.05)
+
+
 def test_a_cloud_that_shows_no_surface_says_so() -> None:
     parts = [paraboloid(150) + np.array([100.0 * k, 0, 0]) for k in range(3)]
     with pytest.raises(ReconstructionError, match="the largest component holds 150 of 450"):
