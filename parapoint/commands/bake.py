@@ -11,22 +11,22 @@ from parapoint.commands.memory import memory_option
 from parapoint.commands.output import TEXTURE
 from parapoint.commands.progress import baking, bar
 from parapoint.errors import InputError
+from parapoint.files.pieces import point_pieces
 from parapoint.files.png import png
-from parapoint.files.reading import faults_of, read_parameterized, read_surface
+from parapoint.files.reading import faults_of, read_parameterized
 from parapoint.files.targets import checked_picture, complete_file, sealed_png
 from parapoint.fitting import Progress
 from parapoint.surfaces.parameterization import Charted
-from parapoint.surfaces.surface import Mesh, PointCloud
 from parapoint.textures.baking import (
     MAPS,
     MARGIN,
     baked,
-    check_bakeable,
     check_in_square,
     check_size,
     check_together,
 )
 from parapoint.textures.placing import Placing
+from parapoint.textures.thinning import thinned
 
 
 @click.command(no_args_is_help=True, options_metavar="[OPTIONS] --map KIND --out FILE")
@@ -53,8 +53,9 @@ def bake(
     """Paint what the points of a cloud know into a texture.
 
     MODEL is a folder of `fit`, or a mesh with UVs, of the same surface. CLOUD may have any number
-    of points. Of a folder the texture fits the UVs that `map` writes. A normal map is in tangent
-    space, as glTF has it; a position map is a geometry image of 16 bits.
+    of points: LAS, LAZ and binary PLY are read a piece at a time, and no more points are kept than
+    the texture can show. Of a folder the texture fits the UVs that `map` writes. A normal map is
+    in tangent space, as glTF has it; a position map is a geometry image of 16 bits.
     """
     if kind not in MAPS:
         raise InputError(f"--map must be one of {', '.join(MAPS)}, not {kind!r}")
@@ -62,31 +63,27 @@ def bake(
     path = checked_picture(out, inputs=[model, cloud], force=force)
     with bar() as tell:
         tell(Progress("reading"))
-        points = _points(cloud, kind)
         charted = _charted(model)
         with faults_of(Path(cloud)):
+            points, count = thinned(point_pieces(cloud), kind, charted, texture)
             check_together(charted, points)
         made = baked(charted, points, kind, texture, margin, done=baking(tell))
         tell(Progress("writing"))
         data = sealed_png(png(made.pixels, made.text))
         with complete_file(path) as file:
             file.write(data)
-    facts = {"file": out, "map": kind, "points": len(points.points), "texture": texture}
+    facts = {
+        "file": out,
+        "map": kind,
+        "points": count,
+        "points_used": len(points.points),
+        "texture": texture,
+    }
     facts |= {"texture_fill": round(made.fill, 3), **made.text}
     if as_json:
         print(json.dumps(facts))
     else:
-        print(f"{out}: {kind} of {len(points.points)} points in {texture} x {texture} texels")
-
-
-def _points(path: str, kind: str) -> PointCloud:
-    """The cloud, once it is known to have what the map shows."""
-    surface = read_surface(path)
-    with faults_of(Path(path)):
-        if isinstance(surface, Mesh):
-            raise InputError("is a mesh; a cloud of points is baked")
-        check_bakeable(surface, kind)
-    return surface
+        print(f"{out}: {kind} of {count} points in {texture} x {texture} texels")
 
 
 def _charted(model: str) -> Charted:

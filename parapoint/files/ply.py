@@ -6,7 +6,9 @@ Ours, since trimesh takes PLY triangle strips for points and mixed binary polygo
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,6 +30,7 @@ from parapoint.surfaces.surface import FloatArray, IntArray
 
 BLOCK = 1 << 20
 """Units of a file, bytes or numbers of a text file, among which rows are looked for at once."""
+HEADER_END = re.compile(rb"[\r\n]end_header[ \t\r]*\n")
 INDICES = {"vertex_indices", "vertex_index"}
 UV_COLUMNS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texcoord_u", "texcoord_v"))
 """Names under which the UV of vertices stand."""
@@ -153,7 +156,7 @@ def _columns(
 
 def _parts(data: bytes) -> tuple[list[tuple[str, int, list[_Property]]], _Body]:
     """The elements and the body of a PLY file."""
-    closing = re.search(rb"[\r\n]end_header[ \t\r]*\n", data)
+    closing = HEADER_END.search(data)
     if not data.startswith(b"ply") or data[3:4].strip() or closing is None:
         raise InputError("has no PLY header")
     end, body_begin = closing.span()
@@ -161,6 +164,40 @@ def _parts(data: bytes) -> tuple[list[tuple[str, int, list[_Property]]], _Body]:
     raw = data[body_begin:]
     body = _Body(raw, None if encoding else floats(plain_numbers(raw).split(), 1).reshape(-1))
     return elements, body
+
+
+def ply_pieces(path: Path, size: int) -> Iterator[Content] | None:
+    """What `ply` reads of a binary file that holds points alone, at most `size` at a time.
+
+    None where it is no such file, or ends early: `ply` says what is wrong.
+    """
+    with path.open("rb") as stream:
+        head = stream.read(BLOCK)
+    closing = HEADER_END.search(head)
+    if not head.startswith(b"ply") or closing is None:
+        return None
+    encoding, elements = _ply_header(head[3 : closing.start()].decode("latin-1").splitlines())
+    if not encoding or not elements or any(count for _, count, _ in elements[1:]):
+        return None
+    name, count, properties = elements[0]
+    width = sum(item.type.itemsize for item in properties)
+    if name != "vertex" or any(item.count_type is not None for item in properties):
+        return None
+    if path.stat().st_size < closing.end() + count * width:
+        return None
+    return _pieces_of_rows(path, head[: closing.end()], count, width, size)
+
+
+def _pieces_of_rows(
+    path: Path, header: bytes, count: int, width: int, size: int
+) -> Iterator[Content]:
+    """A file whose `count` rows of some bytes follow the header, as files of `size` rows each."""
+    with path.open("rb") as stream:
+        stream.seek(len(header))
+        for begin in range(0, count, size):
+            rows = min(size, count - begin)
+            own = re.sub(rb"(element\s+vertex\s+)\d+", rb"\g<1>%d" % rows, header, count=1)
+            yield ply(own + stream.read(rows * width))
 
 
 def ply(data: bytes) -> Content:

@@ -90,7 +90,7 @@ def read_surface(path: str | Path) -> Surface:
     with faults_of(path):
         content = _content(path)
         if not len(content.sizes):
-            return _point_cloud(content, path)
+            return point_cloud(content, path)
         return _mesh(content)[0]
 
 
@@ -124,7 +124,7 @@ def read_polygons(path: str | Path) -> Polygons | PointCloud:
     with faults_of(path):
         content = _content(path)
         if not len(content.sizes):
-            return _point_cloud(content, path)
+            return point_cloud(content, path)
         mesh, places = _mesh(content)
         extras = [
             "normals" if content.normals is not None else "",
@@ -227,29 +227,36 @@ def has_faces(path: str | Path) -> bool:
 
 def _content(path: Path) -> Content:
     """What the file holds, by the reader of its ending."""
-    reader = FORMATS.get(path.suffix.lower())
     if path.is_dir():
         raise InputError("is a folder, not a file")
     if not path.exists():
         raise InputError("no such file")
-    if reader is None:
+    if path.suffix.lower() not in FORMATS:
         raise InputError(f"has an unknown ending; known are {', '.join(FORMATS)}")
     if not path.is_file():
         raise InputError("is not a regular file")
+    reader = FORMATS[path.suffix.lower()]
     data = path.read_bytes()
-    try:
+    with unreadable(path):
         content = reader(data if path.suffix.lower() == ".npz" else plain(data), path.parent)
+    check_fits_together(content)
+    return content
+
+
+@contextmanager
+def unreadable(path: Path) -> Iterator[None]:
+    """What readers and their libraries raise on bytes of another kind becomes an InputError."""
+    try:
+        yield
     except InputError:
         raise
     except UNREADABLE as error:
         kind = path.suffix.lstrip(".").upper()
         detail = " ".join(str(error).split())[:200] or type(error).__name__
         raise InputError(f"is no {kind} file that can be read ({detail})") from error
-    _check_fits_together(content)
-    return content
 
 
-def _check_fits_together(content: Content) -> None:
+def check_fits_together(content: Content) -> None:
     """Check that what a file holds is numbers of the shapes that `Content` has, a mesh finite."""
     count = len(content.vertices)
     infinite = ~np.isfinite(content.vertices).all(axis=1)
@@ -337,7 +344,7 @@ def _rows_of_one_place(
     return np.concatenate([uv, uv[pair_row[again]]]), new_row[pair.reshape(-1)].reshape(-1, 3)
 
 
-def _point_cloud(content: Content, path: Path) -> PointCloud:
+def point_cloud(content: Content, path: Path) -> PointCloud:
     """The finite points, with normals where all of them have one."""
     finite: BoolArray = np.asarray(np.isfinite(content.vertices).all(axis=1))
     if not finite.any():

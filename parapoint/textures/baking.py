@@ -20,6 +20,8 @@ from parapoint.textures.texels import Texels, texels
 
 MAPS = ("colour", "normal", "position", "intensity")
 """What can be baked."""
+SHOWN = {"colour": "colours", "intensity": "intensity"}
+"""The attribute of the points that a map shows, of those that show one."""
 SMALLEST, LARGEST = 16, 8192
 """Texels along a side of a texture."""
 MARGIN = 16
@@ -58,7 +60,7 @@ def check_bakeable(cloud: PointCloud, kind: str) -> None:
     """
     if kind not in MAPS:
         raise InputError(f"--map must be one of {', '.join(MAPS)}, not {kind!r}")
-    needed = {"colour": "colours", "intensity": "intensity"}.get(kind)
+    needed = SHOWN.get(kind)
     if needed is not None and needed not in cloud.attributes:
         known = ", ".join(sorted(cloud.attributes)) or "none"
         raise InputError(f"has no {needed} to bake; the attributes of its points: {known}")

@@ -1,0 +1,54 @@
+"""The points of a file a piece at a time, for clouds that are larger than the memory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from parapoint.errors import InputError
+from parapoint.files.content import Content
+from parapoint.files.las import las_pieces
+from parapoint.files.ply import ply_pieces
+from parapoint.files.reading import (
+    check_fits_together,
+    faults_of,
+    point_cloud,
+    read_surface,
+    unreadable,
+)
+from parapoint.surfaces.surface import Mesh, PointCloud
+
+PIECE = 1_000_000
+"""Points that are read at a time; they take 50 to 100 MB."""
+SPLIT: dict[str, Callable[[Path, int], Iterator[Content] | None]] = {
+    ".ply": ply_pieces,
+    ".las": las_pieces,
+    ".laz": las_pieces,
+}
+"""How files of an ending are read in pieces; those of other endings are read whole."""
+
+
+def point_pieces(path: str | Path) -> Iterator[PointCloud]:
+    """The points of a file in its order, PIECE at a time where its kind allows that.
+
+    An attribute may be of a narrower type in one piece than in the others; the values are the same.
+    Where LAS points have no colour in all of a piece, that piece has no "colours".
+
+    Raises:
+        InputError: as for `read_surface`; the file holds a mesh.
+    """
+    path = Path(path)
+    with faults_of(path), unreadable(path):
+        split = SPLIT.get(path.suffix.lower()) if path.is_file() else None
+        contents = None if split is None else split(path, PIECE)
+        for content in contents or ():
+            check_fits_together(content)
+            if np.isfinite(content.vertices).all(axis=1).any():
+                yield point_cloud(content, path)
+    if contents is None:
+        surface = read_surface(path)
+        if isinstance(surface, Mesh):
+            raise InputError(f"{path}: is a mesh; a cloud of points is baked")
+        yield surface
