@@ -44,10 +44,10 @@ def thinned(
     count = 0
     for piece in pieces:
         cubes, first = np.unique(_cubes(piece.points, low, side), return_index=True)
-        fresh = ~np.isin(cubes, taken, assume_unique=True)
+        fresh = np.append(taken, -1)[np.searchsorted(taken, cubes)] != cubes
         count += len(piece.points)
         if fresh.any():
-            taken = np.union1d(taken, cubes[fresh])
+            taken = np.sort(np.concatenate([taken, cubes[fresh]]), kind="stable")  # merges two
             kept.append(_rows(piece, np.sort(first[fresh]), kind))
     if not kept:
         raise InputError("has no point with finite coordinates")
