@@ -53,3 +53,14 @@ def test_the_load_is_that_of_a_minute_over_the_processors(monkeypatch):
 def test_a_system_that_does_not_tell_its_load_has_none(monkeypatch):
     monkeypatch.delattr(environment.os, "getloadavg")
     assert environment.load() is None
+
+
+@pytest.mark.parametrize(
+    ("cpuinfo", "known", "expected"),
+    [("vendor: x\nmodel name\t: Fast 5\n", "", "Fast 5"), ("", "i386", "i386"), ("", "", "arm64")],
+)
+def test_the_processor_has_a_name_wherever_it_is_told(cpuinfo, known, expected, monkeypatch):
+    monkeypatch.setattr(Path, "read_text", lambda _: cpuinfo)
+    monkeypatch.setattr(environment.platform, "processor", lambda: known)
+    monkeypatch.setattr(environment.platform, "machine", lambda: "arm64")
+    assert environment.processor.__wrapped__() == expected

@@ -87,6 +87,11 @@ def test_torn_ends_gather_one_after_another(tmp_path):
     assert (tmp_path / "runs.torn").read_bytes() == b"first\nsecond\n"
 
 
+def test_no_row_is_a_program(store):
+    add(store)
+    assert not store.row_file.path.stat().st_mode & 0o111
+
+
 def test_every_torn_prefix_keeps_the_rows_before_it(tmp_path):
     store = Store(tmp_path)
     with store.writing():

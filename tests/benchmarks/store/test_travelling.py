@@ -56,6 +56,17 @@ def archive(tmp_path):
     return path
 
 
+def test_a_row_without_a_surface_needs_none_and_one_that_is_there_stays(tmp_path):
+    here = write(tmp_path / "a", "wavy_sheet")
+    there = write(tmp_path / "b", "wavy_sheet")
+    (row,) = here.rows()
+    place = there.surface_path(row.surface_hash)
+    place.write_bytes(b"what was there")
+    bare = dataclasses.replace(row, case="missing", surface_hash="")
+    assert publishing.supply_surfaces(here, there, [row, bare]) == {}
+    assert place.read_bytes() == b"what was there"
+
+
 def scores(store, rows):
     return {row.id: measuring.row_metrics(store, row) for row in rows}, {}
 

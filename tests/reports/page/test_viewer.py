@@ -209,6 +209,16 @@ def test_a_map_that_is_not_cut_lists_no_corners():
     assert (given["angle"] == 0).mean() > 0.95
 
 
+def test_a_face_begins_with_the_edge_that_it_shares_with_the_one_before():
+    mesh = sheet()
+    found, _, _ = viewer.ordered(mesh)
+    before, here = found.faces[:-1], found.faces[1:]
+    shared = (here[:, :, None] == before[:, None]).any(axis=2)
+    neighbours = shared.sum(axis=1) == 2
+    assert neighbours.mean() > 0.5
+    assert shared[neighbours, :2].all()
+
+
 def test_a_cut_map_comes_back_with_its_seams():
     mesh = ball()
     # Every face on its own, mirrored in u: all edges are seams.

@@ -13,7 +13,19 @@ from reports.pictures import exports
 from ..conftest import HAND, Writer, ball, flat, lonlat, sheet
 
 
-@pytest.mark.parametrize(("mesh", "result"), [(sheet(), flat(sheet())), (ball(), lonlat(ball()))])
+def turned_round(of: Parameterization) -> Parameterization:
+    """The same map, its points in another order than the vertices."""
+    return Parameterization(of.uv[::-1], len(of.uv) - 1 - of.corners)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "result"),
+    [
+        (sheet(), flat(sheet())),
+        (ball(), lonlat(ball())),
+        (ball(), turned_round(lonlat(ball()))),
+    ],
+)
 def test_other_programs_read_the_exports_back(tmp_path, mesh, result):
     exports.textured(tmp_path / "map", mesh, result)
     assert {path.name for path in tmp_path.iterdir()} == {

@@ -42,6 +42,18 @@ def built(tmp_path_factory):
     return place, found
 
 
+def test_a_method_page_lists_the_models_after_one_that_lacks_it(tmp_path, monkeypatch):
+    writer = Writer(tmp_path / "run")
+    with writer.store.writing():
+        writer.cell("a", sheet(), "slim", {}, result=flat(sheet()))
+        writer.cell("b", sheet(), "lscm", {}, result=flat(sheet()))
+    draw_small(monkeypatch)
+    building.build([tmp_path / "run"], tmp_path / "out", jobs=1)
+    (page,) = (tmp_path / "out" / "methods").glob("lscm*.html")
+    models = {Path(one).stem for one in addresses(page) if "models/" in one}
+    assert any(name.startswith("b") for name in models)
+
+
 def addresses(page: Path) -> set[str]:
     text = page.read_text(encoding="utf-8")
     found = re.findall(r'(?:href|src|srcset|data-map)="([^"#]+)', text)
