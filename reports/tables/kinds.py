@@ -42,7 +42,8 @@ def kind(contents: Contents, case: str) -> str:
     if entry is not None and entry.set in {"wild", "scans"}:
         return {"wild": "defective", "scans": "scans"}[entry.set]
     mesh = None if entry else contents.mesh(case)
-    topology = entry.topology if entry else mesh.topology if mesh else "unknown"
+    without = "clouds" if case in contents.clouds else "unknown"
+    topology = entry.topology if entry else mesh.topology if mesh else without
     known = {"disk": "disk", "sphere": "closed, genus 0"}
     if topology.endswith("no boundary"):
         return "closed, handles"
