@@ -13,7 +13,7 @@ UNWRAP, MESH = ["unwrap", "scan.xyz"], ["unwrap", "mesh.obj"]
 FIT, MAP = ["fit", "scan.xyz"], ["map", "model", "scan.xyz"]
 BAKE = ["bake", "mesh.obj", "scan.xyz", "--map", "colour"]
 READERS = ("unwrap.read_polygons", "fit.read_surface", "map.read_surface")
-READERS += ("bake.read_surface", "bake.read_parameterized")
+READERS += ("bake.point_pieces", "bake.read_parameterized")
 
 CASES = [
     *(
