@@ -28,6 +28,9 @@ from parapoint.unwrapping.unwrap import Unwrap
 
 logger = logging.getLogger("parapoint")
 
+SECONDS_OF_A_FACE, GROWTH = 5e-5, 1.2
+"""What unwrapping takes, for the progress bar: the first number times the faces to the power of the
+second gives the seconds of one idle core, 7 for 20,000 faces and 50 for 100,000."""
 Y_UP = (".obj", ".glb", ".gltf")
 """Endings of files in which y is upwards by rule or by custom; in others it is z."""
 
@@ -69,7 +72,8 @@ def unwrap_mesh(
     began = time.perf_counter()
     seconds = request.method.time_budget
     at_most = "" if seconds is None else f" (at most {seconds:g} s)"
-    tell(Progress(f"cutting and flattening{at_most}"))
+    remaining = expected(request.method, len(mesh.faces))
+    tell(Progress(f"cutting and flattening{at_most}", remaining=remaining))
     made = _made(mesh, request, output)
     tell(Progress("packing"))
     placed = packed(Charted(mesh, made), request.border)
@@ -92,6 +96,17 @@ def unwrap_mesh(
     _warn_of_bound(facts, request)
     warn(facts, ADVICE_OF_MESHES)
     return facts
+
+
+def expected(method: Unwrap, faces: int) -> float | None:
+    """Seconds that unwrapping so many faces should take; None where only a bound on energy ends it.
+
+    No method takes longer than its time budget.
+    """
+    if method.max_distortion is not None:
+        return method.time_budget
+    seconds = SECONDS_OF_A_FACE * faces**GROWTH
+    return seconds if method.time_budget is None else min(seconds, method.time_budget)
 
 
 def _made(mesh: Mesh, request: Request, output: MeshOutput) -> Parameterization:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from parapoint import cli
+from parapoint.commands.unwrapping import expected
 from parapoint.files.reading import read_parameterized, read_surface
 from parapoint.surfaces.areas import MOST_STARVED
 from parapoint.testing import irregular_disk
@@ -252,3 +253,17 @@ def test_a_distortion_does_not_go_with_seams_that_are_given(box, tmp_path, capsy
     status, _, said = unfold(box, tmp_path / "new.glb", capsys, "--distortion", "balanced")
     assert status == 2
     assert "--distortion does not go with --seams" in said
+
+
+@pytest.mark.parametrize(
+    ("method", "seconds"),
+    [
+        (Unwrap(), 50.0),
+        (Unwrap(time_budget=20.0), 20.0),
+        (Unwrap(time_budget=90.0), 50.0),
+        (Unwrap(max_distortion=4.1), None),
+        (Unwrap(max_distortion=4.1, time_budget=90.0), 90.0),
+    ],
+)
+def test_what_unwrapping_should_take_is_told(method, seconds) -> None:
+    assert expected(method, 100_000) == (seconds and pytest.approx(seconds, rel=1e-6))
