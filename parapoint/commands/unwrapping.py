@@ -105,7 +105,7 @@ def expected(method: Unwrap, faces: int) -> float | None:
     """
     if method.max_distortion is not None:
         return method.time_budget
-    seconds = SECONDS_OF_A_FACE * float(faces) ** GROWTH
+    seconds = SECONDS_OF_A_FACE * math.pow(faces, GROWTH)
     return seconds if method.time_budget is None else min(seconds, method.time_budget)
 
 
