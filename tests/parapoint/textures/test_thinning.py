@@ -53,8 +53,8 @@ def scan(request, tmp_path):
     return path
 
 
-@pytest.mark.parametrize("kind", ["colour", "intensity", "position"])
-@pytest.mark.parametrize("size", [1, 60, 100, 1000])
+@pytest.mark.parametrize("kind", ["colour", "intensity"])
+@pytest.mark.parametrize("size", [7, 60, 1000])
 def test_a_cloud_is_the_same_in_pieces_of_any_size(size, kind, scan, monkeypatch, caplog) -> None:
     whole, count = thinned([read_surface(scan)], kind, SQUARE, 8)
     said = [record.message for record in caplog.records]
