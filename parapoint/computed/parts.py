@@ -20,7 +20,7 @@ from parapoint.planar.bijection import is_bijective
 from parapoint.planar.descent import Run
 from parapoint.planar.growth import Need, grown
 from parapoint.planar.scaffold import LEAST_GAIN, excess, of_area_one, steps_down
-from parapoint.surfaces.areas import signed_areas, starved_share
+from parapoint.surfaces.areas import LEAST_PART, signed_areas, starved_share
 from parapoint.surfaces.surface import FloatArray, Mesh
 
 Distortion = Literal["conformal", "balanced", "isometric"]
@@ -28,8 +28,6 @@ DISTORTIONS: tuple[Distortion, ...] = get_args(Distortion)
 """What a map keeps: "conformal" angles, whatever becomes of the parts; "balanced" angles as far as
 every part keeps its area; "isometric" angles and areas alike."""
 
-MOST_STARVED = 0.01
-"""Share of the surface that may be starved of area, so that no part of 1 % can be."""
 HALVINGS = 5
 """A step that would starve a part is shortened to within 2 to the power of minus this."""
 
@@ -49,7 +47,7 @@ def parts_kept(
     """
     if distortion == "conformal":
         return disk, uv
-    if distortion == "balanced" and starved_share(disk, uv) <= MOST_STARVED:
+    if distortion == "balanced" and starved_share(disk, uv) <= LEAST_PART:
         return disk, uv
     size = np.sqrt(disk.face_areas.sum())
     unit = of_area_one(disk.vertices, disk.faces)
@@ -57,7 +55,7 @@ def parts_kept(
     run = Run(unit, deadline)
     run.take(uv, "conformal")
     run.improve()
-    run = grown(run, Need(most_starved=MOST_STARVED))
+    run = grown(run, Need(most_starved=LEAST_PART))
     unit, uv = run.mesh, run.uv
     if distortion == "balanced":
         uv = towards_conformal(unit, uv, deadline)
@@ -65,7 +63,7 @@ def parts_kept(
 
 
 def towards_conformal(
-    disk: Mesh, uv: FloatArray, deadline: float, most_starved: float = MOST_STARVED
+    disk: Mesh, uv: FloatArray, deadline: float, most_starved: float = LEAST_PART
 ) -> FloatArray:
     """The map `uv` (V, 2) moved down the conformal energy until the next move starves too much.
 

@@ -16,10 +16,10 @@ import numpy as np
 from scipy.sparse import csgraph
 
 from parapoint import clock
-from parapoint.computed.parts import MOST_STARVED, Distortion
+from parapoint.computed.parts import Distortion
 from parapoint.computed.scale import area_discrepancy, even_scale, log_scale, mapped_areas, turning
 from parapoint.planar.embedding import embeddable, few_edges_graph, path_edges
-from parapoint.surfaces.areas import STARVED
+from parapoint.surfaces.areas import LEAST_PART, STARVED
 from parapoint.surfaces.cutting import cut_along, cut_to_disk
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
 
@@ -30,7 +30,7 @@ OPEN_SEAM, CLOSED_SEAM = 0.022, 0.037
 without boundary."""
 TIPS = 3
 """Extremal points that are tried as the tip of each cut."""
-PREDICTED_STARVED = MOST_STARVED / 2
+PREDICTED_STARVED = LEAST_PART / 2
 """Share of the surface that the predicted scale may starve; the map's own is up to 0.5 % above."""
 FED = 0.35
 """Cuts are led to what has less than this part of its fair area, and are judged by it: above

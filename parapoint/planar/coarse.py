@@ -19,6 +19,8 @@ from parapoint.surfaces.surface import IntArray, Mesh, flat_faces
 
 COARSE = 4_000
 """Faces of the simplified mesh."""
+LARGE = 8_000
+"""Faces from which on a mesh is simplified: below, its own growth takes a few seconds."""
 
 
 def grown_as_coarse(mesh: Mesh, need: Need, deadline: float) -> tuple[Mesh, tuple[int, ...]]:

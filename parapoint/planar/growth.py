@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csgraph
 
 from parapoint.planar.descent import LEAST_ENERGY, Run
-from parapoint.surfaces.areas import MOST_STARVED, starved_faces, starved_share
+from parapoint.surfaces.areas import LEAST_PART, starved_faces, starved_share
 from parapoint.surfaces.cutting import edge_graph, edge_lengths, path_to
 from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh
 
@@ -38,7 +38,7 @@ class Need:
     """
 
     price: float = PRICE
-    most_starved: float = MOST_STARVED
+    most_starved: float = LEAST_PART
     most_energy: float = np.inf
 
     def is_starved(self, run: Run) -> bool:

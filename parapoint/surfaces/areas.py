@@ -10,6 +10,8 @@ from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
 STARVED = 0.25
 """A face is starved where its share of the UV area is below this part of its share in space: a
 texture then has less than half of the fair number of texels along a side."""
+LEAST_PART = 0.01
+"""Share of the surface from which on something is a part: a map that starves less starves none."""
 MOST_STARVED = 0.02
 """Share of the surface that a map may starve before that is a fault of it."""
 

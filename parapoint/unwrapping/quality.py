@@ -10,12 +10,10 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from parapoint.planar.crossing import crossing_vertices
-from parapoint.surfaces.areas import STARVED
+from parapoint.surfaces.areas import LEAST_PART, STARVED
 from parapoint.surfaces.parameterization import Charted, Parameterization
 from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, flat_faces, twin_halfedges
 
-LEAST_PART = 0.01
-"""Share of the surface that a starved part must hold to be looked at by itself."""
 DOUBLED = 1e-6
 """Share of a map's area that may be covered twice by rounding alone."""
 

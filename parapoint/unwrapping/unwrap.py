@@ -18,14 +18,14 @@ from parapoint.computed.reconstruction import ReconstructionError
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
 from parapoint.parameters import LONGEST_SECONDS, check_choice, check_number
-from parapoint.planar.coarse import grown_as_coarse
-from parapoint.planar.descent import LARGE, LEAST_ENERGY, Run, sound
+from parapoint.planar.coarse import LARGE, grown_as_coarse
+from parapoint.planar.descent import LEAST_ENERGY, Run, sound
 from parapoint.planar.domains import FlatteningError
 from parapoint.planar.embedding import embeddable
 from parapoint.planar.growth import PRICE, Need, grown
 from parapoint.planar.scaffold import of_area_one
 from parapoint.surfaces.across_seams import learned_seam
-from parapoint.surfaces.areas import MOST_STARVED
+from parapoint.surfaces.areas import LEAST_PART
 from parapoint.surfaces.cutting import cut_along, disk_cut
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.preparation import LEAST_TIME, prepared
@@ -221,7 +221,7 @@ class Unwrap:
         """Move the map down the conformal energy as far as `distortion` says."""
         if self.distortion == "isometric":
             return
-        most_starved = 1.0 if self.distortion == "conformal" else MOST_STARVED
+        most_starved = 1.0 if self.distortion == "conformal" else LEAST_PART
         unit = of_area_one(run.mesh.vertices, run.mesh.faces)
         uv = towards_conformal(unit, run.uv / run.unit, run.deadline, most_starved)
         run.take(run.unit * uv, run.start)

@@ -6,9 +6,9 @@ import pytest
 from benchmarks.cases import builtin
 from benchmarks.metrics.evaluation import evaluate
 from parapoint.computed.flattening import flattened
-from parapoint.computed.parts import MOST_STARVED, parts_kept
+from parapoint.computed.parts import parts_kept
 from parapoint.planar.bijection import bijective_map, is_bijective
-from parapoint.surfaces.areas import starved_share
+from parapoint.surfaces.areas import LEAST_PART, starved_share
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray, Mesh
 
@@ -26,7 +26,7 @@ def test_a_finger_is_starved_by_the_conformal_map_alone(conformal) -> None:
         disk, uv = parts_kept(*conformal, distortion)
         assert is_bijective(disk, uv)
         share = starved_share(disk, uv)
-        assert (share > 0.2) if distortion == "conformal" else (share <= MOST_STARVED)
+        assert (share > 0.2) if distortion == "conformal" else (share <= LEAST_PART)
         found[distortion] = evaluate(disk, Parameterization(uv, disk.faces))
     assert found["conformal"]["part_area_ratio_min"] < 1
     assert found["balanced"]["part_area_ratio_min"] == 1
