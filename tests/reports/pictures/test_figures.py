@@ -325,6 +325,7 @@ def test_a_map_that_may_not_be_ranked_is_not_fit(tmp_path):
     found = plots.trade_offs(made, HAND)
     assert found["fit"].to_dict() == {"LSCM": False, "ARAP": False, "SLIM": True}
     assert found.loc["ARAP", ANGLE] == plots.LEAST_ANGLE
+    assert (found[AREA] >= 1e-3).all()  # an isometry would have 0, which has no logarithm
 
 
 def test_energies_stand_against_seams(tmp_path):

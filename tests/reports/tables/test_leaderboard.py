@@ -68,6 +68,9 @@ def test_the_cells_are_json_with_every_metric(suite):
     hostile = next(cell for cell in only["cells"] if cell["status"] == "timeout")
     assert only["methods"][hostile["method"]]["name"] == HOSTILE
     assert hostile["entries"][0] == ["–", None, ""]
+    for method in only["methods"]:
+        done, asked = map(int, method["ok"].split("/"))
+        assert method["share"] == done / asked
     measured = suite.measured.set_index("id").loc[suite.rows[0].id, "angle_difference_mean"]
     at = names.index("angle_difference_mean")
     assert only["cells"][0]["entries"][at][1] == pytest.approx(measured, rel=1e-4)
