@@ -54,15 +54,10 @@ def test_conformality_of_the_paper_s_models(name, spec, expected, tolerance):
         assert (signed_areas(result.uv, result.corners) > 0).all()
 
 
-@pytest.mark.parametrize(
-    ("name", "expected", "tolerance"), [("beetle_igl", 0.037, 0.003), ("camelhead", 0.32, 0.005)]
-)
-def test_conformality_of_slim_after_20_iterations(name, expected, tolerance):
-    mesh = model(name)
+def test_conformality_of_slim_after_20_iterations():
+    mesh = model("camelhead")
     result = registry.method("slim")[1].parameterize(mesh, seed=0)
-    assert angle_difference_mean(mesh, result.uv, result.corners) == pytest.approx(
-        expected, abs=tolerance
-    )
+    assert angle_difference_mean(mesh, result.uv, result.corners) == pytest.approx(0.32, abs=0.005)
 
 
 @pytest.mark.parametrize("name", ["spot_c3d", "fertility", "torus_odedstein", "kitten.nf20k"])

@@ -48,7 +48,6 @@ def assert_golden(spec, case):
     [
         ("hand_1_i_f5000", 0, 1, 125),
         ("cylinder_cgal", 0, 1, 0),
-        ("spot_c3d", 0, 0, 147),
         ("fertility", 4, 0, 302),
         ("kitten", 1, 0, 137),
     ],
