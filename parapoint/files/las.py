@@ -15,7 +15,7 @@ import numpy as np
 from parapoint.errors import InputError
 from parapoint.files.attributes import named_attributes
 from parapoint.files.content import Content, points_content
-from parapoint.files.decoding import check_decoded
+from parapoint.files.decoding import check_decoded, plain
 
 NOISE = (7, 18)
 """Classes of points that are noise, low and high, by the LAS specification."""
@@ -38,11 +38,16 @@ def las(data: bytes) -> Content:
         read = laspy.read(io.BytesIO(data))
     content = _content(read.points)
     _warn_of_noise(len(content.vertices), len(read.points))
+    colours = content.attributes.get("colours")
+    if colours is not None and not colours.any():  # room for colours that were never taken
+        del content.attributes["colours"]
     return content
 
 
 def las_pieces(path: Path, size: int) -> Iterator[Content]:
     """What `las` reads of a file, at most `size` points at a time, for files of any length.
+
+    Where the points have room for colours, pieces have colours, though they be black.
 
     Raises:
         InputError: as by `las`.
@@ -50,9 +55,9 @@ def las_pieces(path: Path, size: int) -> Iterator[Content]:
     import laspy
 
     with path.open("rb") as stream:
-        check_header(stream.read(HEADER), path.stat().st_size)
+        check_header(plain(stream.read(HEADER)), path.stat().st_size)
     kept = 0
-    with _faults(), laspy.open(path) as file:
+    with _faults(), laspy.open(path, read_evlrs=False) as file:
         for points in file.chunk_iterator(size):
             content = _content(points)
             kept += len(content.vertices)
@@ -63,9 +68,10 @@ def las_pieces(path: Path, size: int) -> Iterator[Content]:
 
 @contextmanager
 def _faults() -> Iterator[None]:
-    """What laspy says becomes an InputError."""
+    """What laspy says becomes an InputError, and nothing else is said of it."""
     import laspy
 
+    logging.getLogger("laspy").setLevel(logging.CRITICAL + 1)
     try:
         yield
     except laspy.LaspyException as error:
@@ -79,10 +85,9 @@ def _content(points: laspy.ScaleAwarePointRecord) -> Content:
         kept = ~np.isin(points["classification"], NOISE) & (np.asarray(points["withheld"]) == 0)
     names = [name for name in points.point_format.dimension_names if name not in "XYZ"]
     columns = {name: np.asarray(points[name])[kept] for name in names}
-    if all(name in columns and not columns[name].any() for name in ("red", "green", "blue")):
-        for name in ("red", "green", "blue"):  # room for colours that were never taken
-            del columns[name]
-    with np.errstate(over="ignore"):  # a coordinate that leaves the numbers is dropped, and counted
+    with np.errstate(
+        over="ignore", invalid="ignore"
+    ):  # a coordinate that leaves the numbers is dropped, and counted
         places = [np.asarray(points[axis], dtype=np.float64)[kept] for axis in "xyz"]
     return points_content(np.stack(places, axis=1), attributes=named_attributes(columns))
 

@@ -14,11 +14,11 @@ from parapoint.files.ply import ply_pieces
 from parapoint.files.reading import (
     check_fits_together,
     faults_of,
-    point_cloud,
     read_surface,
     unreadable,
+    warn_of_dropped,
 )
-from parapoint.surfaces.surface import Mesh, PointCloud
+from parapoint.surfaces.surface import BoolArray, Mesh, PointCloud
 
 PIECE = 1_000_000
 """Points that are read at a time; they take 50 to 100 MB."""
@@ -31,10 +31,10 @@ SPLIT: dict[str, Callable[[Path, int], Iterator[Content] | None]] = {
 
 
 def point_pieces(path: str | Path) -> Iterator[PointCloud]:
-    """The points of a file in its order, PIECE at a time where its kind allows that.
+    """The finite points of a file in its order, PIECE at a time where its kind allows that.
 
-    An attribute may be of a narrower type in one piece than in the others; the values are the same.
-    Where LAS points have no colour in all of a piece, that piece has no "colours".
+    Colours and other attributes may be of a narrower type in one piece than in another; the values
+    are the same.
 
     Raises:
         InputError: as for `read_surface`; the file holds a mesh.
@@ -43,12 +43,26 @@ def point_pieces(path: str | Path) -> Iterator[PointCloud]:
     with faults_of(path), unreadable(path):
         split = SPLIT.get(path.suffix.lower()) if path.is_file() else None
         contents = None if split is None else split(path, PIECE)
+        count = dropped = 0
         for content in contents or ():
             check_fits_together(content)
-            if np.isfinite(content.vertices).all(axis=1).any():
-                yield point_cloud(content, path)
+            is_finite: BoolArray = np.asarray(np.isfinite(content.vertices).all(axis=1))
+            count, dropped = count + len(is_finite), dropped + int((~is_finite).sum())
+            if is_finite.any():
+                yield _chosen(content, is_finite)
+        if dropped:
+            warn_of_dropped(path, dropped, count)
     if contents is None:
         surface = read_surface(path)
         if isinstance(surface, Mesh):
             raise InputError(f"{path}: is a mesh; a cloud of points is baked")
         yield surface
+
+
+def _chosen(content: Content, rows: BoolArray) -> PointCloud:
+    """Some points, with their normals if these are finite."""
+    normals = None if content.normals is None else content.normals[rows]
+    if normals is not None and not np.isfinite(normals).all():
+        normals = None
+    attributes = {name: values[rows] for name, values in content.attributes.items()}
+    return PointCloud(content.vertices[rows], normals, attributes=attributes)

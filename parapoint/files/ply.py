@@ -22,6 +22,7 @@ from parapoint.files.content import (
     floats,
     integers,
     plain_numbers,
+    points_content,
     ranges,
     strip_triangles,
     whole,
@@ -185,19 +186,21 @@ def ply_pieces(path: Path, size: int) -> Iterator[Content] | None:
         return None
     if path.stat().st_size < closing.end() + count * width:
         return None
-    return _pieces_of_rows(path, head[: closing.end()], count, width, size)
+    return _pieces_of_rows(path, closing.end(), count, properties, size)
 
 
 def _pieces_of_rows(
-    path: Path, header: bytes, count: int, width: int, size: int
+    path: Path, begin: int, count: int, properties: list[_Property], size: int
 ) -> Iterator[Content]:
-    """A file whose `count` rows of some bytes follow the header, as files of `size` rows each."""
+    """The `count` rows of a file from a byte on, `size` at a time."""
+    width = sum(item.type.itemsize for item in properties)
     with path.open("rb") as stream:
-        stream.seek(len(header))
-        for begin in range(0, count, size):
-            rows = min(size, count - begin)
-            own = re.sub(rb"(element\s+vertex\s+)\d+", rb"\g<1>%d" % rows, header, count=1)
-            yield ply(own + stream.read(rows * width))
+        stream.seek(begin)
+        for first in range(0, count, size):
+            rows = min(size, count - first)
+            body = _Body(stream.read(rows * width), None)
+            columns, _ = _ply_table(body, 0, rows, properties)
+            yield points_content(*_points_of(columns))
 
 
 def ply(data: bytes) -> Content:
@@ -220,15 +223,21 @@ def ply(data: bytes) -> Content:
             elif name == "tristrips":
                 triangles = strip_triangles(sizes_here, whole(values))
                 sizes, corners = np.full(len(triangles), 3), triangles.reshape(-1)
+    uv, uv_corners = _ply_uv(columns, corners, sizes, wedges) if len(sizes) else (None, None)
+    vertices, normals, attributes = _points_of(columns)
+    return Content(vertices, sizes, corners, normals, uv, uv_corners, attributes)
+
+
+def _points_of(
+    columns: dict[str, npt.NDArray[Any]],
+) -> tuple[FloatArray, FloatArray | None, dict[str, npt.NDArray[Any]]]:
+    """The positions, the normals if there are any, and the attributes of the rows of a table."""
     if not all(axis in columns for axis in "xyz"):
         raise InputError("has no vertex element with x, y and z")
-    vertices = _stacked(columns, "x", "y", "z")
     normals = None
     if all(axis in columns for axis in ("nx", "ny", "nz")):
         normals = _stacked(columns, "nx", "ny", "nz")
-    uv, uv_corners = _ply_uv(columns, corners, sizes, wedges) if len(sizes) else (None, None)
-    attributes = named_attributes(columns)
-    return Content(vertices, sizes, corners, normals, uv, uv_corners, attributes)
+    return _stacked(columns, "x", "y", "z"), normals, named_attributes(columns)
 
 
 def _ply_uv(

@@ -90,7 +90,7 @@ def read_surface(path: str | Path) -> Surface:
     with faults_of(path):
         content = _content(path)
         if not len(content.sizes):
-            return point_cloud(content, path)
+            return _point_cloud(content, path)
         return _mesh(content)[0]
 
 
@@ -124,7 +124,7 @@ def read_polygons(path: str | Path) -> Polygons | PointCloud:
     with faults_of(path):
         content = _content(path)
         if not len(content.sizes):
-            return point_cloud(content, path)
+            return _point_cloud(content, path)
         mesh, places = _mesh(content)
         extras = [
             "normals" if content.normals is not None else "",
@@ -183,7 +183,8 @@ def faults_of(path: Path) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+        named = str(error).startswith(f"{path}: ")
+        raise InputError(str(error) if named else f"{path}: {error}") from None
     except MemoryError:
         raise InputError(f"{path}: is too large for the memory of this machine") from None
     except OSError as error:
@@ -344,7 +345,14 @@ def _rows_of_one_place(
     return np.concatenate([uv, uv[pair_row[again]]]), new_row[pair.reshape(-1)].reshape(-1, 3)
 
 
-def point_cloud(content: Content, path: Path) -> PointCloud:
+def warn_of_dropped(path: Path, dropped: int, count: int) -> None:
+    """Say how many points of a file are left out."""
+    logger.warning(
+        "%s: %d of %d points dropped: their coordinates are not finite", path, dropped, count
+    )
+
+
+def _point_cloud(content: Content, path: Path) -> PointCloud:
     """The finite points, with normals where all of them have one."""
     finite: BoolArray = np.asarray(np.isfinite(content.vertices).all(axis=1))
     if not finite.any():
@@ -352,12 +360,7 @@ def point_cloud(content: Content, path: Path) -> PointCloud:
             "has no point" if len(finite) == 0 else "has no point with finite coordinates"
         )
     if not finite.all():
-        logger.warning(
-            "%s: %d of %d points dropped: their coordinates are not finite",
-            path,
-            int((~finite).sum()),
-            len(finite),
-        )
+        warn_of_dropped(path, int((~finite).sum()), len(finite))
     normals = None if content.normals is None else content.normals[finite]
     if normals is not None and not np.isfinite(normals).all():
         logger.warning("%s: normals left out: some are not finite", path)

@@ -12,6 +12,7 @@ from scipy import ndimage
 
 from parapoint.errors import InputError
 from parapoint.files.attributes import unit_colours
+from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.surface import FloatArray, PointCloud
 from parapoint.textures.scattered import Scattered
@@ -83,7 +84,7 @@ def check_size(size: int, margin: int) -> None:
 
 
 def check_in_square(charted: Charted) -> None:
-    """Check that a map lies in the unit square.
+    """Check that a map lies in the unit square, and has an area there.
 
     Raises:
         InputError: it does not.
@@ -91,6 +92,8 @@ def check_in_square(charted: Charted) -> None:
     used = charted.map.uv[np.unique(charted.map.corners)]
     if used.min() < -1e-6 or used.max() > 1 + 1e-6:
         raise InputError("its UVs leave the unit square, so one texture cannot hold them")
+    if not np.abs(signed_areas(charted.map.uv, charted.map.corners)).sum() > 0:
+        raise InputError("its UVs have no area, so no texture can show it")
 
 
 def check_together(charted: Charted, cloud: PointCloud) -> None:

@@ -300,6 +300,7 @@ def test_bake_of_a_mesh_is_of_its_own_uv(model, bowl, scan, tmp_path, capsys) ->
         (["bake", "MESH", "MESH", "--out", "a.png", "--map", "position"], "is a mesh; a cloud"),
         (["bake", "SCAN", "SCAN", "--out", "a.png", "--map", "colour"], "a UV map needs a mesh"),
         (["bake", "MESH", "FAR", "--out", "a.png", "--map", "position"], "does not lie on"),
+        (["bake", "NO_AREA", "SCAN", "--out", "a.png", "--map", "colour"], "UVs have no area"),
         (["bake", "EMPTY", "SCAN", "--out", "a.png", "--map", "colour"], "no saved model here"),
     ],
 )
@@ -314,11 +315,15 @@ def test_wrong_use_is_one_line_and_nothing_written(arguments, message, tmp_path,
         "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
     )
     names = {"SCAN": "scan.ply", "BARE": "bare.xyz", "FAR": "far.xyz"}
-    names |= {"MESH": "mesh.obj", "EMPTY": "empty"}
+    names |= {"MESH": "mesh.obj", "EMPTY": "empty", "NO_AREA": "line.obj"}
+    (tmp_path / "line.obj").write_text(
+        "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0.5 0\nf 1/1 2/2 3/3\n"
+    )
     before = {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
     with contextlib.chdir(tmp_path):
         status, out, err = run([names.get(word, word) for word in arguments], capsys)
     assert (status, out) == (2, "")
     assert message in err
     assert err.count("\n") == 1
+    assert not any(err.count(f"{name}: ") > 1 for name in names.values())
     assert {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before

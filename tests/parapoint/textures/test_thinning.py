@@ -1,5 +1,7 @@
 """Clouds read in pieces, and thinned to what a texture can show."""
 
+import gzip
+
 import laspy
 import numpy as np
 import pytest
@@ -81,6 +83,30 @@ def test_the_first_point_of_a_cube_stays() -> None:
     np.testing.assert_array_equal(few.points, points[[0, 3, 4]])
 
 
+def test_where_the_map_is_large_more_points_stay() -> None:
+    """The left half of the square fills four fifths of the texture."""
+    middle = np.array([[4, 0, 0], [4, 8, 0.0]])
+    faces = [[0, 4, 5], [0, 5, 3], [4, 1, 2], [4, 2, 5]]
+    corners = np.concatenate([CORNERS, middle])
+    uv = corners[:, :2] / 8
+    uv[4:, 0] = 0.95
+    uneven = Charted(Mesh(corners, faces), Parameterization(uv, faces))
+    rng = np.random.default_rng(2)
+    made, _ = thinned(
+        [PointCloud(rng.uniform(0, 8, (60_000, 3)) * [1, 1, 0])], "position", uneven, 8
+    )
+    left = made.points[:, 0] < 3.8
+    assert left.sum() > 2 * (made.points[:, 0] > 4.2).sum()
+
+
+@pytest.mark.parametrize("far", [9.0, -9.0, 1e30, -1e30, 1.7e308])
+def test_points_far_away_on_any_side_are_few(far) -> None:
+    points = np.random.default_rng(3).uniform(0, 8, (20_000, 3)) * [1, 1, 0]
+    points[::2] += [0, far, 0]
+    made, _ = thinned([PointCloud(points)], "position", SQUARE, 8)
+    assert 250 < len(made.points) <= 2 * 256 + 40
+
+
 def test_more_points_than_a_texture_shows_take_no_more_room() -> None:
     rng = np.random.default_rng(1)
     parts = [PointCloud(rng.uniform(0, 8, (5000, 3)) * [1, 1, 0]) for _ in range(8)]
@@ -107,6 +133,57 @@ def test_what_no_point_has_cannot_be_baked(kind, message) -> None:
             thinned([some, bare], kind, SQUARE, 8)
 
 
+def test_the_type_of_colours_goes_by_all_points() -> None:
+    """Those that say that a colour has 16 bits may be ones that are left out."""
+    first = np.array([[1.0, 1, 0]])
+    same = np.repeat(first, 3, axis=0)
+    dark = np.array([[9, 8, 7], [60_000, 0, 0], [0, 0, 0]], dtype=np.uint16)
+    whole = PointCloud(same, attributes={"colours": dark})
+    for parts in (
+        [whole],
+        [PointCloud(first, attributes={"colours": dark[:1].astype(np.uint8)}), whole],
+    ):
+        made, _ = thinned(parts, "colour", SQUARE, 8)
+        assert made.attributes["colours"].dtype == np.uint16
+        np.testing.assert_array_equal(made.attributes["colours"], dark[:1])
+    black = PointCloud(same, attributes={"colours": dark * 0})
+    with pytest.raises(InputError, match="all of its points are black"):
+        thinned([black, black], "colour", SQUARE, 8)
+    bright, dim = ({"colours": np.full((1, 3), value)} for value in (1.0, 0.5))
+    whole_numbers = {"colours": np.full((1, 3), 200, dtype=np.uint8)}
+    for other, is_good in ((bright, True), (dim, False)):
+        pair = [
+            PointCloud(first, attributes=whole_numbers),
+            PointCloud(first + 4, attributes=other),
+        ]
+        if is_good:
+            made, _ = thinned(pair, "colour", SQUARE, 8)
+            assert made.attributes["colours"].tolist() == [[200] * 3, [1] * 3]
+            assert made.attributes["colours"].dtype == np.uint8
+        else:
+            with pytest.raises(InputError, match="some are fractions"):
+                thinned(pair, "colour", SQUARE, 8)
+
+
+def test_what_a_piece_lacks_all_lack() -> None:
+    """A column with a number that is no colour holds none; nor do normals that are not finite."""
+    good = PointCloud(CORNERS, CORNERS + 1, attributes={"colours": np.full((4, 3), 9, np.uint8)})
+    for bare, kind in ((PointCloud(CORNERS), "colour"), (PointCloud(CORNERS), "normal")):
+        with pytest.raises(InputError, match="to bake"):
+            thinned([good, bare], kind, SQUARE, 8)
+
+
+def test_a_comment_that_looks_like_the_element_is_a_comment(tmp_path, monkeypatch) -> None:
+    path = tmp_path / "comment.ply"
+    write_points(path, cloud(), cloud().points[:, :2])
+    data = path.read_bytes().replace(
+        b"element vertex", b"comment element vertex 7\nelement vertex", 1
+    )
+    path.write_bytes(data)
+    monkeypatch.setattr(pieces, "PIECE", 60)
+    assert sum(len(piece.points) for piece in point_pieces(path)) == 200
+
+
 def test_what_is_no_cloud_is_refused_in_one_line(tmp_path) -> None:
     mesh = tmp_path / "mesh.ply"
     mesh.write_text(
@@ -122,10 +199,13 @@ def test_what_is_no_cloud_is_refused_in_one_line(tmp_path) -> None:
     file = laspy.read(noise)
     file.classification[:] = 7
     file.write(noise)
+    packed = tmp_path / "packed.las"
+    packed.write_bytes(gzip.compress(noise.read_bytes(), mtime=0))
     for path, message in (
         (mesh, "mesh.ply: is a mesh; a cloud of points is baked"),
         (torn, "torn.ply: ends early: 200 vertices are announced"),
         (noise, "noise.las: has no point that is neither noise nor withheld"),
+        (packed, "packed.las: is packed by gzip; unpack it first"),
         (tmp_path / "none.las", "none.las: no such file"),
         (tmp_path / "none.odd", "none.odd: no such file"),
     ):
@@ -140,7 +220,7 @@ def some_colours(count: int) -> dict[str, np.ndarray]:
     }
 
 
-def test_pieces_without_a_finite_point_are_left_out(tmp_path, monkeypatch) -> None:
+def test_pieces_without_a_finite_point_are_left_out(tmp_path, monkeypatch, caplog) -> None:
     points = np.concatenate([np.full((4, 3), np.nan), CORNERS, np.full((4, 3), np.nan)])
     header = "ply\nformat binary_little_endian 1.0\nelement vertex 12\n"
     header += "".join(f"property double {axis}\n" for axis in "xyz") + "end_header\n"
@@ -149,6 +229,10 @@ def test_pieces_without_a_finite_point_are_left_out(tmp_path, monkeypatch) -> No
     monkeypatch.setattr(pieces, "PIECE", 4)
     (piece,) = point_pieces(path)
     np.testing.assert_array_equal(piece.points, CORNERS)
+    (said,) = caplog.records
+    assert said.getMessage().endswith(
+        "gaps.ply: 8 of 12 points dropped: their coordinates are not finite"
+    )
     path.write_bytes(header.encode() + np.full((12, 3), np.nan).tobytes())
     with pytest.raises(InputError, match="has no point with finite coordinates"):
         thinned(point_pieces(path), "position", SQUARE, 8)
