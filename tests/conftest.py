@@ -10,3 +10,11 @@ def nothing_is_installed():
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PIP_NO_INDEX", "1")
         yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def output_is_buffered():
+    """Python buffers what is printed, as on most machines: what must not be lost is said by us."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv("PYTHONUNBUFFERED", raising=False)
+        yield

@@ -59,7 +59,9 @@ class _Slot:
         self.interpreter = interpreter
         self.modules = modules
         self.replies, send = os.pipe()
-        variables = dict.fromkeys(THREAD_VARIABLES, str(threads)) | {"PYTHONHASHSEED": "0"}
+        variables = dict.fromkeys(THREAD_VARIABLES, str(threads))
+        # What a cell printed is kept, too, where it is killed before it ends.
+        variables |= {"PYTHONHASHSEED": "0", "PYTHONUNBUFFERED": "1"}
         self.process = subprocess.Popen(  # noqa: S603  our own module
             [interpreter, "-m", "benchmarks.running.worker", str(send), *modules],
             stdin=subprocess.PIPE,
