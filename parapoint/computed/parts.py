@@ -55,7 +55,7 @@ def parts_kept(
     run = Run(unit, deadline)
     run.take(uv, "conformal")
     run.improve()
-    run = grown(run, Need(most_starved=LEAST_PART))
+    run = grown(run, Need())
     unit, uv = run.mesh, run.uv
     if distortion == "balanced":
         uv = towards_conformal(unit, uv, deadline)

@@ -85,9 +85,8 @@ def _content(points: laspy.ScaleAwarePointRecord) -> Content:
         kept = ~np.isin(points["classification"], NOISE) & (np.asarray(points["withheld"]) == 0)
     names = [name for name in points.point_format.dimension_names if name not in "XYZ"]
     columns = {name: np.asarray(points[name])[kept] for name in names}
-    with np.errstate(
-        over="ignore", invalid="ignore"
-    ):  # a coordinate that leaves the numbers is dropped, and counted
+    # A coordinate that leaves the numbers is dropped later, and counted.
+    with np.errstate(over="ignore", invalid="ignore"):
         places = [np.asarray(points[axis], dtype=np.float64)[kept] for axis in "xyz"]
     return points_content(np.stack(places, axis=1), attributes=named_attributes(columns))
 

@@ -84,7 +84,7 @@ def check_size(size: int, margin: int) -> None:
 
 
 def check_in_square(charted: Charted) -> None:
-    """Check that a map lies in the unit square, and has an area there.
+    """Check that a map lies in the unit square, and shows some face with an area there.
 
     Raises:
         InputError: it does not.
@@ -92,8 +92,9 @@ def check_in_square(charted: Charted) -> None:
     used = charted.map.uv[np.unique(charted.map.corners)]
     if used.min() < -1e-6 or used.max() > 1 + 1e-6:
         raise InputError("its UVs leave the unit square, so one texture cannot hold them")
-    if not np.abs(signed_areas(charted.map.uv, charted.map.corners)).sum() > 0:
-        raise InputError("its UVs have no area, so no texture can show it")
+    in_plane = signed_areas(charted.map.uv, charted.map.corners) != 0
+    if not (in_plane & (charted.mesh.face_areas > 0)).any():
+        raise InputError("its UVs have no area where its faces do, so no texture can show it")
 
 
 def check_together(charted: Charted, cloud: PointCloud) -> None:

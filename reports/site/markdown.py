@@ -26,6 +26,7 @@ ABOUT = (
     "results folder and keeps the others. Each names the commit and the machine of its run. "
     "Validity comes before rank (METRICS.md, *Grades*)."
 )
+"""What stands above the sections."""
 SECTION = re.compile(
     r"^## [^\n]* \(`([^`\n]+)`\)\n.*?(?=^## [^\n]* \(`[^`\n]+`\)$|\Z)", re.MULTILINE | re.DOTALL
 )

@@ -301,6 +301,7 @@ def test_bake_of_a_mesh_is_of_its_own_uv(model, bowl, scan, tmp_path, capsys) ->
         (["bake", "SCAN", "SCAN", "--out", "a.png", "--map", "colour"], "a UV map needs a mesh"),
         (["bake", "MESH", "FAR", "--out", "a.png", "--map", "position"], "does not lie on"),
         (["bake", "NO_AREA", "SCAN", "--out", "a.png", "--map", "colour"], "UVs have no area"),
+        (["bake", "NO_SIZE", "SCAN", "--out", "a.png", "--map", "colour"], "UVs have no area"),
         (["bake", "EMPTY", "SCAN", "--out", "a.png", "--map", "colour"], "no saved model here"),
     ],
 )
@@ -316,6 +317,10 @@ def test_wrong_use_is_one_line_and_nothing_written(arguments, message, tmp_path,
     )
     names = {"SCAN": "scan.ply", "BARE": "bare.xyz", "FAR": "far.xyz"}
     names |= {"MESH": "mesh.obj", "EMPTY": "empty", "NO_AREA": "line.obj"}
+    names |= {"NO_SIZE": "point.obj"}
+    (tmp_path / "point.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 2 0 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
+    )
     (tmp_path / "line.obj").write_text(
         "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0.5 0\nf 1/1 2/2 3/3\n"
     )
