@@ -23,6 +23,8 @@ from parapoint.textures.texels import texels
 HELD_OUT = 0.2
 """Share of the points that no texture is baked from, and that test it."""
 
+GAP = 2
+"""Texels between the charts of a texture, and around them: bilinear reading needs one."""
 LEAST_ERROR = 1e-10
 """Mean squared error of colours from 0 to 1 that counts as none: 100 dB."""
 STREAM = 20240317
@@ -68,10 +70,11 @@ class Textured:
             surface.points[is_seen], normals, attributes={"colours": colours[is_seen]}
         )
         if self.pipeline == "computed":
-            charted = packed(ComputedMap().charted(seen, seed=seed))
+            made = ComputedMap().charted(seen, seed=seed)
         else:
-            made = Meshed(reconstruction=self.pipeline, flattening="xatlas")
-            charted = packed(made.charted(seen, seed=seed))
+            meshed = Meshed(reconstruction=self.pipeline, flattening="xatlas")
+            made = meshed.charted(seen, seed=seed)
+        charted = packed(made, GAP / self.texels)
         begun = time.process_time()
         if self.pipeline == "computed":
             texture = baked(charted, seen, "colour", self.texels).pixels

@@ -170,7 +170,10 @@ def _parts(data: bytes) -> tuple[list[tuple[str, int, list[_Property]]], _Body]:
 def ply_pieces(path: Path, size: int) -> Iterator[Content] | None:
     """What `ply` reads of a binary file that holds points alone, at most `size` at a time.
 
-    None where it is no such file, or ends early: `ply` says what is wrong.
+    None where it is no such file.
+
+    Raises:
+        InputError: it ends early.
     """
     with path.open("rb") as stream:
         head = stream.read(BLOCK)
@@ -185,7 +188,7 @@ def ply_pieces(path: Path, size: int) -> Iterator[Content] | None:
     if name != "vertex" or any(item.count_type is not None for item in properties):
         return None
     if path.stat().st_size < closing.end() + count * width:
-        return None
+        raise _ends_early(count)
     return _pieces_of_rows(path, closing.end(), count, properties, size)
 
 
@@ -297,6 +300,10 @@ def _ply_header(lines: list[str]) -> tuple[str, list[tuple[str, int, list[_Prope
     return encoding, elements
 
 
+def _ends_early(count: int) -> InputError:
+    return InputError(f"ends early: {count} vertices are announced")
+
+
 def _ply_table(
     body: _Body, at: int, count: int, properties: list[_Property]
 ) -> tuple[dict[str, npt.NDArray[Any]], int]:
@@ -308,7 +315,7 @@ def _ply_table(
     width = sum(body.width(item.type) for item in properties)
     end = at + count * width
     if end > body.size:
-        raise InputError(f"ends early: {count} vertices are announced")
+        raise _ends_early(count)
     if body.numbers is not None:
         rows = body.numbers[at:end].reshape(count, width)
         return {

@@ -100,3 +100,77 @@ def test_the_unit_and_the_place_of_a_map_make_no_difference(unit) -> None:
     known = packed(given).map.uv
     moved = Parameterization(unit * (given.map.uv + 8), given.map.corners)
     np.testing.assert_allclose(packed(Charted(given.mesh, moved)).map.uv, known, atol=1e-4)
+
+
+def gap_between_charts(held: Parameterization) -> float:
+    """The least distance of corners of two charts."""
+    rows = np.unique(held.corners)
+    chart = np.empty(len(held.uv), dtype=int)
+    chart[held.corners] = held.charts()[:, None]
+    distance, near = cKDTree(held.uv[rows]).query(held.uv[rows], k=min(40, len(rows)))
+    is_other = chart[rows][near] != chart[rows][:, None]
+    return np.where(is_other, distance, np.inf).min()
+
+
+def filled(held: Parameterization) -> float:
+    return np.abs(doubled_areas(held.uv, held.corners)).sum() / 2
+
+
+def flat(uv, corners) -> Charted:
+    """A flat mesh, and itself as its map."""
+    uv = np.asarray(uv, dtype=float)
+    return Charted(
+        Mesh(np.column_stack([uv, 0 * uv[:, 0]]), corners), Parameterization(uv, corners)
+    )
+
+
+@pytest.mark.parametrize("spread", [1.0, 1.5, 3.0])
+def test_charts_of_very_different_sizes_keep_their_scale_and_distance(spread) -> None:
+    rng = np.random.default_rng(0)
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    sizes = np.exp(spread * rng.normal(size=400))
+    uv = np.concatenate([size * square for size in sizes])
+    corners = np.concatenate([np.array([[0, 1, 2], [0, 2, 3]]) + 4 * k for k in range(400)])
+    given = flat(uv, corners)
+    made = packed(given).map
+    ratio = doubled_areas(made.uv, corners) / doubled_areas(uv, corners)
+    assert ratio.max() == pytest.approx(ratio.min(), rel=1e-6)
+    assert filled(made) > 0.6
+    assert gap_between_charts(made) > 0.75 / 256
+
+
+def test_a_corner_of_flat_faces_alone_stays_at_its_chart() -> None:
+    # The third triangle of each flag hangs, without area, at its lower side.
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0]])
+    uv = np.concatenate([square * size for size in (1, 2, 3, 4, 5)])
+    one = np.array([[0, 1, 2], [0, 2, 3], [0, 4, 1]])
+    made = packed(flat(uv, np.concatenate([one + 5 * k for k in range(5)]))).map
+    for ring in made.uv.reshape(5, 5, 2):
+        np.testing.assert_allclose(ring[4], (ring[0] + ring[1]) / 2, atol=1e-9)
+    assert gap_between_charts(made) > 0.9 / 256
+    assert filled(made) > 0.4
+
+
+def test_a_chart_that_flat_faces_hold_together_stays_whole() -> None:
+    # Two squares above one another, joined by two triangles that lie on one line.
+    two = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [1, 3], [2, 3], [2, 4], [1, 4]])
+    faces = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7], [1, 2, 4], [2, 4, 7]])
+    count = 6
+    uv = np.concatenate([two * (1 + k / 4) for k in range(count)])
+    made = packed(flat(uv, np.concatenate([faces + 8 * k for k in range(count)]))).map
+    for ring in made.uv.reshape(count, 8, 2):
+        up = ring[2] - ring[1]
+        np.testing.assert_allclose(ring[[4, 7]], ring[1] + np.outer([3, 4], up), atol=1e-9)
+    assert gap_between_charts(made) > 0.9 / 256
+    assert filled(made) > 0.15
+
+
+def test_charts_that_touch_at_a_place_come_apart() -> None:
+    corners = [[0, 1, 2], [2, 3, 4]]
+    uv = [[0, 0], [1, 0], [1, 1], [2, 1], [2, 2]]
+    made = packed(flat(uv, corners)).map
+    areas = doubled_areas(made.uv, made.corners)
+    assert areas[0] == pytest.approx(areas[1], rel=1e-9)
+    assert areas[0] > 0.3
+    assert made.corners[0, 2] != made.corners[1, 0]
+    assert gap_between_charts(made) > 0.9 / 256

@@ -213,6 +213,15 @@ def test_what_is_no_cloud_is_refused_in_one_line(tmp_path) -> None:
             list(point_pieces(path))
 
 
+def test_a_file_that_ends_early_is_refused_before_it_is_read(tmp_path, monkeypatch) -> None:
+    torn = tmp_path / "torn.ply"
+    write_points(torn, cloud(), cloud().points[:, :2])
+    torn.write_bytes(torn.read_bytes()[:-1])
+    monkeypatch.setattr(pieces, "read_surface", None)
+    with pytest.raises(InputError, match="ends early: 200 vertices"):
+        list(point_pieces(torn))
+
+
 def some_colours(count: int) -> dict[str, np.ndarray]:
     return {
         "colours": np.full((count, 3), 300, dtype=np.uint16),
