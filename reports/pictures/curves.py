@@ -35,7 +35,8 @@ class Curves(NamedTuple):
     """The curves of a map.
 
     Attributes:
-        way: (n, 3) seconds, angle and area distortion over all faces of each map that was kept.
+        way: (n, 4) of each map that was kept: seconds, angle and area distortion over all faces,
+            and the share of flipped faces among those that span no seam.
         shares: (2, 80) area of the faces by the larger and by the smaller singular value, in BINS;
             none, (0, 80), where no face has any.
     """
@@ -50,18 +51,19 @@ def curves(found: Map) -> Curves:
 
 
 def _way(found: Map) -> FloatArray:
-    rows: list[tuple[float, float, float]] = []
+    rows: list[tuple[float, float, float, float]] = []
     result = found.parameterization
     for at in result.trace:
         if at.uv is not None and len(at.uv) == len(result.uv):
+            one = Map(found.mesh, Parameterization(at.uv, result.corners))
             try:
-                faces = triangles(found.mesh, Parameterization(at.uv, result.corners))
+                of_all = face_distortion(triangles(one.mesh, one.parameterization))
+                flips = one.flipped[~one.spanning]
             except InputError:  # a state on the way that no number can measure
                 continue
-            of_all = face_distortion(faces)
             angle, area = angle_difference_mean(of_all), area_discrepancy_total(of_all)
-            rows.append((at.seconds, angle, area))
-    return np.array(rows, dtype=np.float64).reshape(-1, 3)
+            rows.append((at.seconds, angle, area, float(flips.mean()) if len(flips) else np.nan))
+    return np.array(rows, dtype=np.float64).reshape(-1, 4)
 
 
 def _shares(found: Map) -> FloatArray:
@@ -88,7 +90,7 @@ def curves_of(contents: Contents, row: ResultRow, pictures: Path) -> Curves | No
     """
     try:
         kept = json.loads((pictures / map_file(row, CURVES)).read_bytes())
-        way = np.array(kept["way"], dtype=np.float64).reshape(-1, 3)
+        way = np.array(kept["way"], dtype=np.float64).reshape(-1, 4)
         return Curves(way, np.array(kept["shares"], dtype=np.float64).reshape(-1, len(BINS) - 1))
     except (OSError, ValueError, TypeError, KeyError):
         mapped = contents.mapped(row)

@@ -21,7 +21,7 @@ from benchmarks.cases.derived import is_drawn
 from benchmarks.store.rows import ResultRow
 from parapoint.files.targets import complete_file, write_text
 from parapoint.sources import source_hash
-from reports.contents import SHEETS, Contents
+from reports.contents import ANGLE, AREA, FLIPPED_OFF_SEAM, SHEETS, Contents
 from reports.pictures.clouds import DENSE, SPARSE, points_used
 from reports.pictures.drawing import known_keys
 from reports.pictures.galleries import (
@@ -40,7 +40,6 @@ from reports.pictures.galleries import (
 from reports.pictures.names import slug
 from reports.pictures.plots import (
     LEAST_SIZES,
-    area_convergence,
     convergence,
     cost,
     losses,
@@ -240,9 +239,9 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
         *several(
             "convergence",
             "Angle distortion against time",
-            "Angle difference over all faces along the way of every method that keeps a trace; a "
-            "single marker is a method without one, at its end.",
-            make=partial(convergence, contents, pictures),
+            "Angle difference over all faces along the way of every method that keeps a trace, a "
+            "line for each seed; a single marker is a method without one, at its end.",
+            make=partial(convergence, contents, pictures, metric=ANGLE),
             cases=cases,
             size=PANELS,
         ),
@@ -250,7 +249,16 @@ def drawings(contents: Contents, pictures: Path) -> list[Drawing]:
             "convergence-area",
             "Area distortion against time",
             "Area discrepancy over all faces along the way, as in the figure of the angles.",
-            make=partial(area_convergence, contents, pictures),
+            make=partial(convergence, contents, pictures, metric=AREA),
+            cases=cases,
+            size=PANELS,
+        ),
+        *several(
+            "convergence-flips",
+            "Flipped faces against time",
+            "Share of flipped faces, of those that span no seam, along the way, as in the figure "
+            "of the angles.",
+            make=partial(convergence, contents, pictures, metric=FLIPPED_OFF_SEAM),
             cases=cases,
             size=PANELS,
         ),

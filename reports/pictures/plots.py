@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
 from parapoint.surfaces.surface import FloatArray
-from reports.contents import ANGLE, AREA, ISOMETRIC, SEAM, Contents
+from reports.contents import ANGLE, AREA, FLIPPED_OFF_SEAM, ISOMETRIC, SEAM, Contents
 from reports.labels import Label
 from reports.pictures.curves import BINS, curves_of
 from reports.pictures.galleries import leading
@@ -28,6 +28,12 @@ from reports.pictures.style import (
 )
 from reports.ranking import may_rank
 
+WAY = {
+    ANGLE: "angle difference [rad]",
+    AREA: "area discrepancy",
+    FLIPPED_OFF_SEAM: "flipped faces [%]",
+}
+"""What is known of the maps on the way to a map, in the order of `Curves.way`, and its axis."""
 LEAST_ANGLE, LEAST_AREA = 1e-4, 1e-3
 """Angle difference in radians, and area discrepancy, below which figures draw all values alike.
 
@@ -96,44 +102,38 @@ def trace_of(contents: Contents, row: ResultRow) -> pd.DataFrame:
     )
 
 
-def convergence(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure | None:
-    """Angle distortion against time for every method with a trace; others as a single point."""
-    return _convergence(contents, pictures, cases, ANGLE)
-
-
-def area_convergence(contents: Contents, pictures: Path, cases: Sequence[str]) -> Figure | None:
-    """Area distortion against time, likewise."""
-    return _convergence(contents, pictures, cases, AREA)
-
-
-def _convergence(
+def convergence(
     contents: Contents, pictures: Path, cases: Sequence[str], metric: str
 ) -> Figure | None:
+    """A metric of WAY against time, a line a seed, for every method with a trace.
+
+    Other methods have a single point for each seed.
+    """
     curves: dict[str, list[tuple[Label, pd.DataFrame]]] = {}
     traced = False
     for case in cases:
         for label in contents.methods:
-            row = contents.shown(case, label)
-            if row is None or row.seconds is None:
-                continue
-            made_of = curves_of(contents, row, pictures)
-            way = made_of.way if made_of else np.empty((0, 3))
-            found = pd.DataFrame(way, columns=["seconds", ANGLE, AREA])
-            traced |= len(found) > 1
-            if len(found) < 2:
-                value = contents.measured.loc[contents.measured["id"] == row.id, metric]
-                found = pd.DataFrame({"seconds": [row.seconds], metric: [float(value.iloc[0])]})
-            known = found[np.isfinite(found[metric]) & _drawn(found["seconds"])].copy()
-            known[metric] = known[metric].clip(lower=LEAST_ANGLE if metric == ANGLE else None)
-            if len(known):  # a map of points has neither angles nor areas of faces
-                curves.setdefault(case, []).append((label, known))
+            for row in contents.cell(case, label):
+                if row.status != "ok" or row.seconds is None:
+                    continue
+                made_of = curves_of(contents, row, pictures)
+                found = pd.DataFrame(made_of.way if made_of else [], columns=["seconds", *WAY])
+                traced |= len(found) > 1
+                if len(found) < 2:
+                    value = contents.measured.loc[contents.measured["id"] == row.id, metric]
+                    found = pd.DataFrame({"seconds": [row.seconds], metric: [float(value.iloc[0])]})
+                known = found[np.isfinite(found[metric]) & _drawn(found["seconds"])].copy()
+                known[metric] = known[metric].clip(lower=LEAST_ANGLE if metric == ANGLE else None)
+                if len(known):  # a map of points has neither angles nor areas of faces
+                    curves.setdefault(case, []).append((label, known))
     if not traced:
         return None
     made, places = small_multiples(len(curves))
     for place, (case, lines) in zip(places, curves.items(), strict=True):
         for label, known in lines:
+            of_all = 100 if metric == FLIPPED_OFF_SEAM else 1
             place.plot(
-                known["seconds"], known[metric], label=label.short, markersize=3.5,
+                known["seconds"], of_all * known[metric], label=label.short, markersize=3.5,
                 **look(contents, label),
             )  # fmt: skip
         place.set_xscale("log")
@@ -141,7 +141,7 @@ def _convergence(
             place.set_yscale("log")
         place.set_title(case)
         place.set_xlabel("seconds")
-    places[0].set_ylabel({ANGLE: "angle difference [rad]", AREA: "area discrepancy"}[metric])
+    places[0].set_ylabel(WAY[metric])
     share_limits(places)
     legend_below(made, places)
     return made

@@ -12,8 +12,9 @@ from PIL import Image as Images
 from pypdf import PdfReader
 from pypdf.generic import StreamObject
 
+from parapoint.surfaces.parameterization import Parameterization, TracePoint
 from reports import contents as contents_module
-from reports.contents import ANGLE, AREA, ISOMETRIC, SEAM, contents
+from reports.contents import ANGLE, AREA, FLIPPED_OFF_SEAM, ISOMETRIC, SEAM, contents
 from reports.pictures import curves as curves_module
 from reports.pictures import figures, galleries, plots
 from reports.pictures.curves import BINS, curves_of
@@ -33,7 +34,7 @@ from reports.pictures.style import (
     wrapped,
 )
 
-from ..conftest import HAND, NEFERTITI, Writer, flat, sheet
+from ..conftest import HAND, NEFERTITI, Writer, ball, flat, lonlat, sheet
 
 
 @pytest.fixture
@@ -121,7 +122,7 @@ def test_the_closed_models_figure_says_what_cut_it_and_why_a_map_is_missing(suit
 
 
 def test_convergence_draws_the_quality_along_the_way(suite, tmp_path):
-    made = plots.convergence(suite, tmp_path, suite.cases)
+    made = plots.convergence(suite, tmp_path, suite.cases, ANGLE)
     panel = next(place for place in made.axes if place.get_title() == HAND)
     lines = {line.get_label(): line for line in panel.get_lines()}
     seconds, angles = lines["SLIM symmetric Dirichlet"].get_data()
@@ -130,6 +131,38 @@ def test_convergence_draws_the_quality_along_the_way(suite, tmp_path):
     row = suite.shown(HAND, suite.methods[0])
     measured = suite.measured.set_index("id").loc[row.id, "angle_difference_mean"]
     assert angles[-1] == pytest.approx(measured)
+
+
+def test_convergence_draws_each_seed_and_no_cell_that_failed(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for seed in range(3):
+            writer.cell(HAND, sheet(), "slim", {}, result=flat(sheet(), seed / 8), seed=seed)
+        writer.cell(HAND, sheet(), "slim", {}, status="timeout", seed=3)
+    suite = contents(tmp_path)[0]
+    (panel,) = plots.convergence(suite, tmp_path, [HAND], ANGLE).axes
+    of_rows = suite.measured.set_index("seed")[ANGLE]
+    ends = [line.get_ydata()[-1] for line in panel.get_lines()]
+    np.testing.assert_allclose(ends, of_rows[[0, 1, 2]])
+    assert len(set(ends)) == 3
+    assert len({line.get_color() for line in panel.get_lines()}) == 1
+
+
+def test_flips_on_the_way_are_percents_of_the_faces_that_span_no_seam(tmp_path):
+    whole = ball()
+    good = lonlat(whole).uv
+    folded = good * [1, np.nan]
+    folded[:, 1] = np.abs(good[:, 1])  # the southern half lies on the northern one
+    trace = tuple(TracePoint(k, 1.0 + k, {}, uv) for k, uv in enumerate((folded, good)))
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        writer.cell(HAND, whole, "slim", {}, result=Parameterization(good, whole.faces, trace))
+    suite = contents(tmp_path)[0]
+    (panel,) = plots.convergence(suite, tmp_path, [HAND], FLIPPED_OFF_SEAM).axes
+    (line,) = panel.get_lines()
+    first, last = line.get_ydata()
+    assert last == 0  # the faces at the date line, turned over, span it
+    assert 45 < first < 55
 
 
 def test_losses_are_those_of_the_trace(suite):
@@ -164,8 +197,9 @@ def test_what_lies_beside_the_pictures_is_not_measured_again(reported, monkeypat
     for row, known in zip(rows, measured, strict=True):
         for one, other in zip(curves_of(suite, row, pictures), known, strict=True):
             np.testing.assert_array_equal(one, other)
-    for draw_one in (plots.convergence, plots.area_convergence, plots.singular_values):
-        assert draw_one(suite, pictures, suite.cases) is not None
+    for metric in plots.WAY:
+        assert plots.convergence(suite, pictures, suite.cases, metric) is not None
+    assert plots.singular_values(suite, pictures, suite.cases) is not None
 
 
 @pytest.mark.parametrize(
