@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -34,10 +35,7 @@ class GridMethod(NeuralMethod):
     subset: int = 576
     time_budget: float | None = None
 
-    @property
-    def deterministic(self) -> bool:
-        """Whether the same seed gives the same map: not where time ends the run."""
-        return self.time_budget is None
+    on_cpu: ClassVar[bool] = True
 
     def cells(
         self, points: FloatArray, drawn: FloatArray, side: int, seed: int

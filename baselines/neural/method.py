@@ -34,6 +34,7 @@ class NeuralMethod:
         subset: points of a step, at most; see `Trainer` on time budgets.
         time_budget: seconds of training at most; the schedule follows the time where that ends
             sooner.
+        on_cpu: whether it trains on the CPU even where there is a GPU.
     """
 
     points: int = 10_000
@@ -43,6 +44,7 @@ class NeuralMethod:
 
     requires: ClassVar[frozenset[str]] = frozenset()
     packages: ClassVar[tuple[str, ...]] = ("torch",)
+    on_cpu: ClassVar[bool] = False
     schedule: ClassVar[Preset] = Preset(all_from=1.0, warm_up=0.0, perturbation=0.0)
 
     def trainer(self) -> type[SurfaceTrainer]:
@@ -61,7 +63,7 @@ class NeuralMethod:
         """Whether the same seed gives the same map: not where time ends the run, nor on CUDA."""
         import torch
 
-        return self.time_budget is None and not torch.cuda.is_available()
+        return self.time_budget is None and (self.on_cpu or not torch.cuda.is_available())
 
     def parameterize(
         self, surface: Surface, *, seed: int

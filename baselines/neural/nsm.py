@@ -58,11 +58,7 @@ class NSM(NeuralMethod):
 
     requires: ClassVar[frozenset[str]] = frozenset({"faces", "disk_after_cut"})
     packages: ClassVar[tuple[str, ...]] = ("torch", "libigl", "shapely")
-
-    @property
-    def deterministic(self) -> bool:
-        """Whether the same seed gives the same map: not where time ends the run."""
-        return self.time_budget is None
+    on_cpu: ClassVar[bool] = True
 
     def parameterize(self, surface: Surface, *, seed: int) -> Parameterization:
         """The map at the vertices, in the unit of the surface.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -32,10 +32,7 @@ class SheetMethod(NeuralMethod):
     subset: int = 1_024
     time_budget: float | None = None
 
-    @property
-    def deterministic(self) -> bool:
-        """Whether the same seed gives the same map: not where time ends the run."""
-        return self.time_budget is None
+    on_cpu: ClassVar[bool] = True
 
     def networks(self, generator: torch.Generator) -> Sheets:
         """Networks to fit, their weights drawn from `generator`."""

@@ -8,6 +8,7 @@ from baselines.neural.atlasnet import AtlasNet
 from baselines.neural.atlasnet_networks import AtlasNetworks, chamfer
 from baselines.neural.foldingnet import FoldingNet
 from baselines.neural.foldingnet_networks import FoldingNetworks, TwoFolds
+from baselines.neural.nuvo import Nuvo
 from baselines.neural.sheets import (
     corner_rows,
     face_charts,
@@ -110,6 +111,12 @@ def test_time_ends_a_fit():
     assert 1 <= len(trace) < 10_000
     assert not FoldingNet(time_budget=1.0).deterministic
     assert FoldingNet().deterministic
+
+
+def test_a_gpu_breaks_the_promise_of_those_alone_that_train_on_it(monkeypatch):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    assert FoldingNet().deterministic
+    assert not Nuvo().deterministic
 
 
 def test_more_squares_are_more_charts_nearer_to_the_surface():
