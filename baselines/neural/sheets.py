@@ -17,6 +17,7 @@ from torch import Tensor, nn
 
 from parapoint import clock
 from parapoint.learned.losses import EPSILON, nearest
+from parapoint.learned.optimizers import AdamW
 from parapoint.surfaces.parameterization import TracePoint
 from parapoint.surfaces.preparation import shelves
 from parapoint.surfaces.surface import FloatArray, IntArray
@@ -25,7 +26,7 @@ Sheet = Callable[[Tensor], Tensor]
 """(1 + T, N, 2) places in the square from -1 to 1, and tangents there → (1 + T, N, 3)."""
 
 RATE = 1e-3
-"""Learning rate of Adam at the start; it falls to 0 like a cosine."""
+"""Learning rate of AdamW at the start; it falls to 0 like a cosine."""
 SAMPLES = 96
 """Samples along a side of a sheet among which a preimage is sought."""
 NEWTON_STEPS = 6
@@ -58,19 +59,16 @@ def fitted(
 ) -> Iterator[TracePoint]:
     """Train networks on the sum of the terms, a step at a time, until the steps or the time end."""
     began = clock.worked()
-    optimizer = torch.optim.Adam(networks.parameters(), lr=RATE)
+    optimizer = AdamW(list(networks.parameters()))
     for step in range(1, iterations + 1):
         seconds = clock.worked() - began
         progress = max((step - 1) / iterations, seconds / (time_budget or math.inf))
         if progress >= 1:
             return
-        for group in optimizer.param_groups:
-            group["lr"] = RATE * (1 + math.cos(math.pi * progress)) / 2
         found = terms()
         total = torch.stack(list(found.values())).sum()
-        optimizer.zero_grad()
         total.backward()  # type: ignore[no-untyped-call]
-        optimizer.step()
+        optimizer.step(RATE * (1 + math.cos(math.pi * progress)) / 2)
         values = {name: term.item() for name, term in found.items()} | {"total": total.item()}
         yield TracePoint(step, clock.worked() - began, values)
 
