@@ -8,10 +8,12 @@ from numpy.testing import assert_allclose
 
 from benchmarks.cases import builtin
 from benchmarks.metrics import state
-from benchmarks.metrics.evaluation import evaluate
+from benchmarks.metrics.evaluation import evaluate, evaluate_points
 from benchmarks.metrics.metric import GROUPS, WITHOUT_SPANNING
 from benchmarks.metrics.table import METRICS
 from parapoint import InputError, Mesh, Parameterization
+from parapoint.surfaces.parameterization import PointParameterization
+from parapoint.surfaces.surface import PointCloud
 
 NAMES = {
     "angle_difference_mean",
@@ -110,6 +112,43 @@ def test_the_registry_has_every_metric_and_says_all_about_it():
         if not name.endswith(WITHOUT_SPANNING) and metric.group != "points":
             assert twin == (metric.group in ("conformal", "authalic", "isometric") or name in TWICE)
     assert METRICS["symmetric_dirichlet"].heading == "symmetric Dirichlet energy (areas sum to 1)"
+
+
+HIGHER_IS_BETTER = {
+    "singular_value_min",
+    "bijective",
+    "part_area_ratio_min",
+    "area_ratio_p01",
+    "coverage",
+    "packing_efficiency",
+    "neighbour_preservation",
+    "neighbour_trustworthiness",
+    "neighbour_continuity",
+    "point_part_area_ratio_min",
+}
+WITHOUT_IDEAL = {
+    "seam_length",
+    "uv_boundary_length",
+    "resolution",
+    "seam_point_fraction",
+    "spanning_point_fraction",
+}
+
+
+def test_a_square_laid_on_itself_has_every_metric_at_its_ideal():
+    steps = np.linspace(0, 1, 15)
+    uv = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=2).reshape(-1, 2)
+    points = np.column_stack([uv, np.zeros(len(uv))])
+    faces = builtin.grid_faces(15, 15)
+    square = Parameterization(uv, faces)
+    values = evaluate(Mesh(points, faces), square, square)
+    values |= evaluate_points(PointCloud(points), PointParameterization(uv))
+    for name, metric in METRICS.items():
+        root = name.removesuffix(WITHOUT_SPANNING)
+        assert (metric.ideal is None) == (root in WITHOUT_IDEAL), name
+        assert metric.better == ("higher" if root in HIGHER_IS_BETTER else "lower"), name
+        if metric.ideal is not None:
+            assert_allclose(values[name], metric.ideal, atol=1e-9, err_msg=name)
 
 
 def test_the_result_has_the_names_of_the_registry_in_order():

@@ -54,6 +54,16 @@ def test_uv_is_scaled_to_the_area_upright_and_unmirrored():
     assert height > 3 * width
 
 
+def test_a_map_whose_spanning_faces_alone_have_an_area_is_scaled_by_them():
+    mesh = sheet()
+    uv = 3 * np.maximum(mesh.vertices[:, :2] - [0.5, 0], 0)  # the left half lies on a line
+    found = Map(mesh, Parameterization(uv, mesh.faces))
+    right = mesh.vertices[mesh.faces][:, :, 0].max(axis=1) > 0.5
+    found.__dict__["spanning"] = right
+    areas = np.linalg.det(np.diff(found.uv, axis=1)) / 2
+    assert areas.sum() == pytest.approx(mesh.face_areas[right].sum())
+
+
 def test_spanning_faces_neither_scale_nor_colour_the_map():
     found = globe()
     assert 0 < found.spanning.mean() < 0.3

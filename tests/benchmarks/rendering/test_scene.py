@@ -74,6 +74,15 @@ def test_lines_behind_the_surface_are_not_drawn():
     assert not view.near_lines(np.zeros((0, 2, 3)), 3).any()
 
 
+def test_a_line_covers_the_width_asked_for_and_has_round_ends():
+    mesh = square()
+    view = Scene(mesh, shadows=False).view(camera(mesh, Z, Y, margin=1.0), 100)
+    line = np.array([[[0.2, 0.5, 0.0], [0.8, 0.5, 0.0]]])
+    cover = view.near_lines(line, 6).sum() / view.samples**2
+    width = 6 + 1 / view.samples  # a sample counts as a whole
+    assert cover == pytest.approx(60 * width + np.pi * (width / 2) ** 2, rel=0.02)
+
+
 def test_edges_cover_the_width_asked_for():
     mesh = square()
     view = Scene(mesh, shadows=False).view(camera(mesh, Z, Y, margin=1.0), 200)

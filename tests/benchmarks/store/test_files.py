@@ -41,6 +41,15 @@ def test_a_noisy_cloud_is_scored_on_its_points_without_noise(tmp_path):
     np.testing.assert_array_equal(scored.points, EXACT.points)
 
 
+def test_the_map_that_a_model_came_with_is_found_by_its_row(tmp_path):
+    store = Store(tmp_path)
+    with store.writing():
+        row = add(store)
+        assert store.reference(row) is None
+        store.add_reference(row.surface_hash, FLAT)
+    np.testing.assert_array_equal(store.reference(row).uv, FLAT.uv)
+
+
 def test_a_row_without_surface_or_map_says_so(tmp_path):
     store = Store(tmp_path)
     with store.writing():
