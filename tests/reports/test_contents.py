@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from parapoint.errors import InputError
+from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh
 from reports.contents import contents, suite_title
 from reports.labels import labels
@@ -71,6 +72,31 @@ def test_variants_are_told_by_their_change_and_the_default_by_its_report(tmp_pat
         "paper, isometric",
         "paper, conformal, 2D→3D→2D alone",
     ]
+
+
+def test_names_that_are_taken_are_numbered(tmp_path):
+    found = labels(
+        rows(
+            tmp_path,
+            ("lscm", {}, {}),
+            ("submitted", {"name": "LSCM"}, {}),
+            ("submitted", {"name": "LSCM", "options": None}, {}),
+        )
+    )
+    assert [label.short for label in found.values()] == ["LSCM", "LSCM #2", "LSCM #3"]
+
+
+def test_the_grade_of_a_mean_is_the_worst_of_its_seeds(tmp_path):
+    mesh = sheet()
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for seed, scale in enumerate(([1, 1], [-1, 1], [1, 0])):
+            uv = flat(mesh).uv * scale
+            writer.cell(HAND, mesh, "slim", {}, result=Parameterization(uv, mesh.faces), seed=seed)
+        writer.cell(HAND, mesh, "lscm", {}, result=flat(mesh))
+        writer.cell(HAND, mesh, "arap", {}, status="timeout")
+    grades = contents(tmp_path)[0].means.set_index("label")["grade"]
+    assert (grades["SLIM"], grades["LSCM"], grades["ARAP"]) == ("broken", "usable", "")
 
 
 def test_a_label_says_what_the_reports_say(tmp_path):
