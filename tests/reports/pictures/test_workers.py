@@ -23,6 +23,12 @@ def test_results_come_in_order_whoever_works() -> None:
     assert list(done_by_several(pow, [], 4)) == []
 
 
+def test_one_job_or_one_piece_of_work_needs_no_other_process() -> None:
+    here = [os.getpid()]
+    assert list(done_by_several(os.getpid, [(), ()], 1)) == here * 2
+    assert list(done_by_several(os.getpid, [()], 4)) == here
+
+
 def test_a_full_dev_shm_leaves_one_process(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
