@@ -139,6 +139,8 @@ def convergence(
         place.set_xscale("log")
         if metric == ANGLE:
             place.set_yscale("log")
+        else:
+            place.set_ylim(bottom=0)
         place.set_title(case)
         place.set_xlabel("seconds")
     places[0].set_ylabel(WAY[metric])
