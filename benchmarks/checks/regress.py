@@ -112,7 +112,7 @@ QUALITY = (
 flips, overlaps, seams."""
 COMPUTED = Comparison(
     "computed",
-    ("computed(points=4000)", "computed", "unwrap(points=2000)"),
+    ("computed(points=4000)", "computed", "unwrap"),
     (
         "hand_1_i_f5000",
         "max_planck_i_f8000",

@@ -82,7 +82,8 @@ class Flattened(NamedTuple):
 
     Attributes:
         rows: (A,) rows of the cloud that the triangulation reached.
-        missed: (B,) rows that it did not reach; those in neither were thinned out.
+        missed: (B,) rows that it did not reach.
+        thinned: how many rows were thinned out: those in neither.
         mesh: the triangulation of these A points.
         disk: the mesh cut to a planar domain of M vertices.
         origin: (M,) the vertex of `mesh` that each one of `disk` is or copies.
@@ -92,6 +93,7 @@ class Flattened(NamedTuple):
 
     rows: IntArray
     missed: IntArray
+    thinned: int
     mesh: Mesh
     disk: Mesh
     origin: IntArray
@@ -155,6 +157,17 @@ def _flattened(
     row[reached] = np.arange(len(reached))
     missed = rows[~mesh.referenced]
     mesh = Mesh(mesh.vertices[reached], row[mesh.faces])
+    disk, uv = _laid_out(mesh, deadline, distortion, say)
+    thinned_out = len(points) - len(rows)
+    return Flattened(
+        rows[reached], missed, thinned_out, mesh, disk, origin(mesh, disk), uv, is_denoised
+    )
+
+
+def _laid_out(
+    mesh: Mesh, deadline: float, distortion: Distortion, say: Say
+) -> tuple[Mesh, FloatArray]:
+    """The mesh cut to a planar domain of M vertices, and their places (M, 2)."""
     begun = clock.worked()
     try:
         say("cutting")
@@ -166,7 +179,7 @@ def _flattened(
         raise ReconstructionError(f"the triangulation has no flat map ({error})") from None
     uv -= (uv.max(axis=0) + uv.min(axis=0)) / 2
     uv *= np.sqrt(disk.face_areas.sum() / signed_areas(uv, disk.faces).sum())
-    return Flattened(rows[reached], missed, mesh, disk, origin(mesh, disk), uv, is_denoised)
+    return disk, uv
 
 
 def flat_map(
@@ -186,7 +199,27 @@ def flat_map(
     Raises:
         ReconstructionError: the points show no surface that can be followed and flattened.
     """
-    flat = flattened(points, deadline, distortion, say)
+    return _differentiated(flattened(points, deadline, distortion, say), distortion)
+
+
+def flat_map_of_faces(mesh: Mesh, deadline: float = math.inf) -> FlatMap:
+    """The conformal map of a mesh by its own faces, worse where `deadline` ends the descents.
+
+    Args:
+        mesh: connected, manifold and oriented; no face without area, no vertex without a face.
+        deadline: as for `flat_map`.
+
+    Raises:
+        ReconstructionError: the mesh has no flat map.
+    """
+    disk, uv = _laid_out(mesh, deadline, "conformal", unheard)
+    rows = np.arange(len(mesh.vertices))
+    flat = Flattened(rows, rows[:0], 0, mesh, disk, origin(mesh, disk), uv, is_denoised=False)
+    return _differentiated(flat, "conformal")
+
+
+def _differentiated(flat: Flattened, distortion: Distortion) -> FlatMap:
+    """One place and one pair of Jacobians for each vertex, and what was found."""
     chosen = flat.chosen()
     jacobians = flat.jacobians()[chosen]
     boundary = [int((of.edge_face_count == 1).sum()) for of in (flat.mesh, flat.disk)]
@@ -196,7 +229,7 @@ def flat_map(
         "faces": len(flat.mesh.faces),
         "seam_edges": (boundary[1] - boundary[0]) // 2,
         "denoised": flat.is_denoised,
-        "thinned": len(points) - len(flat.rows) - len(flat.missed),
+        "thinned": flat.thinned,
         "distortion": distortion,
     }
     inverse: FloatArray = np.asarray(np.linalg.pinv(jacobians, rcond=0.1), dtype=np.float64)

@@ -33,7 +33,7 @@ def grown_as_coarse(mesh: Mesh, need: Need, deadline: float) -> tuple[Mesh, tupl
         need: what the seam is to bring.
         deadline: no step begins after this time of `clock.worked`.
     """
-    simple = simplified(mesh)
+    simple = simplified(mesh, COARSE)
     if simple is None:
         return mesh, ()
     coarse, vertex = simple
@@ -47,18 +47,22 @@ def grown_as_coarse(mesh: Mesh, need: Need, deadline: float) -> tuple[Mesh, tupl
     return embeddable(joined(mesh, tips)), tuple(tips)
 
 
-def simplified(mesh: Mesh) -> tuple[Mesh, IntArray] | None:
-    """A mesh of COARSE faces, and the vertex of the large mesh that each of its vertices is.
+def simplified(mesh: Mesh, count: int) -> tuple[Mesh, IntArray] | None:
+    """A mesh of `count` faces, and the vertex of the given mesh that each of its vertices is.
 
     None where the simplified mesh is another kind of surface, or has faces without area.
+
+    Args:
+        mesh: connected, manifold and oriented.
+        count: faces, fewer than the mesh has.
     """
     _, faces, _, vertex = igl.qslim(
-        np.asfortranarray(mesh.vertices), np.asfortranarray(mesh.faces.astype(np.int32)), COARSE
+        np.asfortranarray(mesh.vertices), np.asfortranarray(mesh.faces.astype(np.int32)), count
     )
     coarse = Mesh(mesh.vertices[vertex], faces)
     is_alike = (
-        coarse.is_manifold
-        and coarse.is_planar_domain
+        coarse.is_connected_surface
+        and coarse.genus == mesh.genus
         and len(coarse.boundary_loops) == len(mesh.boundary_loops)
     )
     if not is_alike or flat_faces(coarse.vertices, coarse.faces).any():

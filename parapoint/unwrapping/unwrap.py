@@ -5,14 +5,16 @@ from __future__ import annotations
 import contextlib
 import logging
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import ClassVar
+from functools import partial
+from typing import Any, ClassVar
 
 import numpy as np
 
 from parapoint import clock
 from parapoint.computed.computed_map import ComputedMap
+from parapoint.computed.faces import map_of_faces
 from parapoint.computed.parts import DISTORTIONS, towards_conformal
 from parapoint.computed.reconstruction import ReconstructionError
 from parapoint.errors import InputError
@@ -30,18 +32,17 @@ from parapoint.surfaces.cutting import cut_along, disk_cut
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.preparation import LEAST_TIME, prepared
 from parapoint.surfaces.sampling import FEWEST_VERTICES
-from parapoint.surfaces.surface import BoolArray, Mesh, Surface
+from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, Surface
 
-POINTS_OF_A_FACE = 100
-"""Of a mesh with few faces so many points are sampled on each."""
-ENOUGH_POINTS = 6_000
-"""So many points show where any mesh should open. camelhead (22,704 faces) comes to an energy of
-4.30 with them in 20 s of processor time, to 4.39 with 20,000 in 45 s; a fish of 220 faces to 5.38
-in 7 s, to 5.63 in 27 s."""
+POINTS_OF_A_FACE, ENOUGH_POINTS = 100, 6_000
+"""Points that are sampled of a mesh: so many on each face, and so many at most."""
 STEPPING = 0.9
 """Share of a time budget after which no step begins: the last one takes time, too."""
 SHARE_OF_SEAM = 0.5
-"""Share of a time budget in which the computed map, which tells the seam, is to be ready."""
+"""Share of the time left in which the computed map, which tells the seam, is to be ready."""
+
+Start = Callable[[float], tuple[BoolArray, dict[str, object]]]
+"""Gives the edges (E,) to be cut at first, by a time of `clock.worked`, and what told them."""
 
 
 @dataclass(frozen=True)
@@ -53,29 +54,29 @@ class Unwrap:
     distorted (`parapoint.planar.growth`), as long as that pays, or until a bound on the energy is
     met, and on until hardly a place is starved of area.
 
-    A disk, with or without holes, begins without a seam. Any other mesh is cut along the seam of
-    `ComputedMap`, made a clean path of edges (`parapoint.surfaces.across_seams`), or along the
-    automatic cut (`parapoint.surfaces.cutting`) where no map can be computed. Where the map must
-    come below a bound on the energy, a disk is begun in both ways, and the shorter seam stays.
+    A mesh is begun along the least cut, none for a disk, with or without holes, and the automatic
+    one (`parapoint.surfaces.cutting`) for others; and once more along the seam of the computed map
+    of its faces (`parapoint.computed.faces`), made a clean path of edges
+    (`parapoint.surfaces.across_seams`). The better map stays, by its energy and the price of its
+    seam: which start leads to it cannot be told before. Where the map must come below a bound on
+    the energy, it is begun along the seam of `ComputedMap` of points, too, and the shortest stays.
     Where to a large mesh's seam grows is told by a simplified one (`parapoint.planar.coarse`), but
     under a bound, as the two differ in energy.
     Components are mapped one after another.
 
     Attributes:
-        points: of the computed map; None for as many as show where the mesh should open.
         time_budget: seconds of work (`parapoint.clock`) for each component, or None for no bound.
             No step begins after that; the map is then as good as it has become.
         price: what the symmetric Dirichlet energy (4 at least) must fall by for each sqrt(area) of
-            seam; None for the learned seam, no shorter and no longer. Under a bound on the energy
-            it is not asked.
+            seam; None for the seam of the computed map, no shorter and no longer. Under a bound on
+            the energy it is not asked.
         max_distortion: symmetric Dirichlet energy, above 4, down to which the seam grows and no
             longer; None for no such bound. The report has the energy that was reached.
         distortion: "isometric" weighs angles and areas alike, as the energy does; "balanced" goes
             on from there to keep angles as far as every part keeps its area; "conformal" keeps
-            angles along the first seam, whatever becomes of an ear or a finger.
+            angles along the seam of the computed map, whatever becomes of an ear or a finger.
     """
 
-    points: int | None = None
     time_budget: float | None = None
     price: float | None = PRICE
     max_distortion: float | None = None
@@ -135,18 +136,7 @@ class Unwrap:
         deadline = math.inf
         if self.time_budget is not None:
             deadline = clock.worked() + STEPPING * self.time_budget
-        seam: BoolArray = np.zeros(len(mesh.edges), dtype=bool)
-        computed: dict[str, object] = {"not_asked": "the mesh is a disk, with or without holes"}
-        run = None
-        if self._grows and mesh.is_planar_domain:
-            half = clock.worked() + (deadline - clock.worked()) / 2
-            with contextlib.suppress(FlatteningError):  # too thin for a start: it is cut first
-                run = self._grown(mesh, seam, deadline if self.max_distortion is None else half)
-        if run is None or (self.max_distortion is not None and self._is_cut_or_in_need(run)):
-            seam, computed = self._seam(mesh, seed, deadline)
-            other = self._grown(mesh, seam, deadline)
-            run = other if run is None else min(run, other, key=self._cost)
-            seam &= run is other
+        run, seam, computed = self._begun(mesh, seed, deadline)
         run.deadline = deadline
         if self._grows:
             run.improve()
@@ -170,13 +160,59 @@ class Unwrap:
             return Need(math.inf, most_energy=self.max_distortion)
         return Need(PRICE if self.price is None else self.price)
 
-    def _is_cut_or_in_need(self, run: Run) -> bool:
-        """Whether a map that begins without a seam has got one, or lacks something still."""
-        return run.branches > 0 or self._need.of(run)
+    def _begun(
+        self, mesh: Mesh, seed: int, deadline: float
+    ) -> tuple[Run, BoolArray, dict[str, object]]:
+        """The best of the maps grown from all starts, its edges cut at first (E,), what told where.
+
+        The starts share the time. One that needs no cut is the last: no other can be shorter.
+
+        Raises:
+            FlatteningError: no start has a map without flips.
+        """
+        starts = self._starts(mesh, seed)
+        fault = FlatteningError("there was no time for a start")
+        best: tuple[Run, BoolArray, dict[str, object]] | None = None
+        for number, start in enumerate(starts):
+            now = clock.worked()
+            if best is not None and now > deadline:
+                break
+            share = now + (deadline - now) / (len(starts) - number)
+            try:
+                seam, told = start(share)
+                found = self._grown(mesh, seam, share), seam, told
+            except FlatteningError as error:  # such as too thin for a start: others are cut
+                fault = error
+                continue
+            best = found if best is None else min(best, found, key=lambda one: self._cost(one[0]))
+            if not (seam.any() or found[0].branches or self._need.of(found[0])):
+                break
+        if best is None:
+            raise fault
+        return best
+
+    def _starts(self, mesh: Mesh, seed: int) -> list[Start]:
+        """The ways to begin, those that take less time first."""
+
+        def least(_: float) -> tuple[BoolArray, dict[str, object]]:
+            return _least_cut(mesh), {"not_asked": "the mesh is opened along the automatic cut"}
+
+        def along_faces(until: float) -> tuple[BoolArray, dict[str, object]]:
+            return _seam(mesh, partial(map_of_faces, mesh), until)
+
+        def along_points(until: float) -> tuple[BoolArray, dict[str, object]]:
+            return _seam(mesh, partial(_map_of_points, mesh, seed), until)
+
+        if not self._grows:
+            return [along_faces]
+        return [least, along_faces, *[along_points] * (self.max_distortion is not None)]
 
     def _cost(self, run: Run) -> tuple[bool, float]:
-        """By which of two maps is worse: one that lacks something, or has the longer seam."""
-        return self._need.of(run), run.rim
+        """By which of two maps is worse: one that lacks something, or costs more."""
+        if self.max_distortion is not None:
+            return self._need.of(run), run.rim
+        price = PRICE if self.price is None else self.price
+        return self._need.of(run), run.energy + price * run.rim / (2 * run.unit)
 
     def _grown(self, mesh: Mesh, seam: BoolArray, deadline: float) -> Run:
         """The settled map of the mesh cut along some edges (E,), and on from there.
@@ -199,24 +235,6 @@ class Unwrap:
             return run
         return grown(run, self._need)
 
-    def _seam(self, mesh: Mesh, seed: int, deadline: float) -> tuple[BoolArray, dict[str, object]]:
-        """(E,) the edges along the seam of the computed map, and the report of that map.
-
-        Where no map can be computed they are those of the automatic cut.
-        """
-        points = self.points or _enough_points(mesh)
-        budget = None
-        if self.time_budget is not None:
-            budget = SHARE_OF_SEAM * max(deadline - clock.worked(), LEAST_TIME)
-        computed = ComputedMap(points, distortion="conformal", time_budget=budget)
-        try:
-            with _unsaid():
-                learned = computed.parameterize(mesh, seed=seed)
-        except ReconstructionError as error:
-            seam = np.zeros(len(mesh.edges), dtype=bool)
-            return seam if mesh.is_planar_domain else disk_cut(mesh), {"failed": str(error)}
-        return learned_seam(mesh, learned.uv), dict(learned.report)
-
     def _keep_angles(self, run: Run) -> None:
         """Move the map down the conformal energy as far as `distortion` says."""
         if self.distortion == "isometric":
@@ -225,6 +243,42 @@ class Unwrap:
         unit = of_area_one(run.mesh.vertices, run.mesh.faces)
         uv = towards_conformal(unit, run.uv / run.unit, run.deadline, most_starved)
         run.take(run.unit * uv, run.start)
+
+
+def _seam(
+    mesh: Mesh, computed: Callable[[float], tuple[FloatArray, dict[str, Any]]], deadline: float
+) -> tuple[BoolArray, dict[str, object]]:
+    """(E,) the edges along the seam of a map that is `computed`, and what is known of that map.
+
+    Where no map can be computed they are those of the automatic cut.
+    """
+    begun = clock.worked()
+    try:
+        uv, facts = computed(begun + SHARE_OF_SEAM * (deadline - begun))
+    except ReconstructionError as error:
+        return _least_cut(mesh), {"failed": str(error)}
+    return learned_seam(mesh, uv), facts
+
+
+def _least_cut(mesh: Mesh) -> BoolArray:
+    """(E,) the edges of the automatic cut to a disk; none where the mesh is a planar domain."""
+    return np.zeros(len(mesh.edges), dtype=bool) if mesh.is_planar_domain else disk_cut(mesh)
+
+
+def _map_of_points(mesh: Mesh, seed: int, deadline: float) -> tuple[FloatArray, dict[str, Any]]:
+    """(V, 2) the conformal `ComputedMap` of points of a mesh, at its vertices, and its report.
+
+    Raises:
+        ReconstructionError: the points show no surface that can be followed.
+    """
+    points = min(ENOUGH_POINTS, max(FEWEST_VERTICES, POINTS_OF_A_FACE * len(mesh.faces)))
+    budget = None
+    if math.isfinite(deadline):
+        budget = max(deadline - clock.worked(), LEAST_TIME)
+    with _unsaid():
+        made = ComputedMap(points, distortion="conformal", time_budget=budget)
+        found = made.parameterize(mesh, seed=seed)
+    return found.uv, dict(found.report)
 
 
 @contextlib.contextmanager
@@ -236,8 +290,3 @@ def _unsaid() -> Iterator[None]:
         yield
     finally:
         logger.disabled = before
-
-
-def _enough_points(mesh: Mesh) -> int:
-    """Points that show where a mesh should open: some on each face, or some of its vertices."""
-    return min(ENOUGH_POINTS, max(FEWEST_VERTICES, POINTS_OF_A_FACE * len(mesh.faces)))

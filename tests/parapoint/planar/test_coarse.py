@@ -25,7 +25,7 @@ def few(monkeypatch) -> int:
 def test_a_simplified_mesh_has_vertices_of_the_large_one(few) -> None:
     mesh = builtin.finger()
     assert len(mesh.faces) > 2 * few
-    found = simplified(mesh)
+    found = simplified(mesh, few)
     assert found is not None
     simple, vertex = found
     assert len(simple.faces) <= few
@@ -59,7 +59,7 @@ def test_the_seam_grows_to_where_that_of_the_simplified_mesh_did() -> None:
 def test_the_mesh_stays_as_it_is_where_the_simplified_one_tells_nothing(lacks, monkeypatch) -> None:
     mesh = builtin.finger()
     if lacks == "mesh":
-        monkeypatch.setattr(coarse, "simplified", lambda _: None)
+        monkeypatch.setattr(coarse, "simplified", lambda *_: None)
     elif lacks == "map":
         monkeypatch.setattr(Run, "begin", Mock(side_effect=FlatteningError("no start")))
     else:

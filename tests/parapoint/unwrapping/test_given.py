@@ -5,13 +5,8 @@ import pytest
 
 from benchmarks.metrics.evaluation import evaluate
 from parapoint import InputError, Mesh
-from parapoint.computed import computed_map
-from parapoint.computed.reconstruction import ReconstructionError
-from parapoint.planar import descent
-from parapoint.planar.domains import FlatteningError
 from parapoint.testing import irregular_disk, sphere
 from parapoint.unwrapping.given import unwrapped_along
-from parapoint.unwrapping.unwrap import Unwrap
 
 NONE = np.zeros((0, 2), dtype=np.int64)
 
@@ -47,36 +42,3 @@ def test_faces_that_do_not_turn_alike_are_refused() -> None:
     faces[0] = faces[0, ::-1]
     with pytest.raises(InputError, match="seams can be given for a manifold"):
         unwrapped_along(Mesh(disk.vertices, faces), NONE)
-
-
-def test_what_is_said_of_points_that_nobody_gave_stays_unsaid(monkeypatch, caplog):
-    """A closed mesh is opened along a map of points that are drawn from it."""
-
-    def parameterize(*_, **__):
-        computed_map.logger.warning("30 of 6000 points are off")
-        raise ReconstructionError("no surface")
-
-    monkeypatch.setattr(computed_map.ComputedMap, "parameterize", parameterize)
-    result = Unwrap(time_budget=5).parameterize(sphere(), seed=0)
-    assert len(result.uv) > 0
-    assert not caplog.records
-    computed_map.logger.warning("heard again")
-    assert [record.message for record in caplog.records] == ["heard again"]
-
-
-def test_a_disk_that_has_no_start_is_cut_first(monkeypatch):
-    """As a tube so thin that Tutte's embedding of its end collapses."""
-    begin, calls = descent.Run.begin, []
-
-    def first_fails(run):
-        calls.append(len(run.mesh.vertices))
-        if len(calls) == 1:
-            raise FlatteningError("collapsed")
-        begin(run)
-
-    monkeypatch.setattr(descent.Run, "begin", first_fails)
-    disk = irregular_disk()
-    result = Unwrap(points=120).parameterize(disk, seed=0)
-    assert len(calls) >= 2
-    assert "not_asked" not in result.report["computed"]
-    assert evaluate(disk, result)["bijective"] == 1

@@ -1,0 +1,121 @@
+"""The starts of a mesh's map, and which of their maps stays."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from benchmarks.cases import builtin
+from benchmarks.metrics.evaluation import evaluate
+from parapoint import clock
+from parapoint.computed.reconstruction import ReconstructionError
+from parapoint.planar import descent
+from parapoint.planar.domains import FlatteningError
+from parapoint.surfaces.cutting import cut_to_disk
+from parapoint.surfaces.surface import Mesh
+from parapoint.testing import irregular_disk, sphere
+from parapoint.unwrapping import unwrap
+from parapoint.unwrapping.unwrap import Unwrap
+
+CAP = builtin.sphere_cap(150, rings=8)
+
+
+@pytest.fixture
+def runs(monkeypatch):
+    """The maps grown from each start, as they come."""
+    grown, found = Unwrap._grown, []
+
+    def kept(self, mesh, seam, deadline):
+        found.append(grown(self, mesh, seam, deadline))
+        return found[-1]
+
+    monkeypatch.setattr(Unwrap, "_grown", kept)
+    return found
+
+
+def seam_of(run, mesh: Mesh) -> float:
+    """Length of the seam in roots of the area: both of its sides are in the rim."""
+    before = mesh.vertices[mesh.edges[mesh.edge_face_count == 1]]
+    rim = np.linalg.norm(before[:, 0] - before[:, 1], axis=1).sum()
+    return (run.rim - rim) / 2 / math.sqrt(mesh.face_areas.sum())
+
+
+@pytest.mark.parametrize(
+    ("mesh", "price"), [(CAP, 0.2), (CAP, 1.0), (sphere(), 1.0), (builtin.torus(8), 1.0)]
+)
+def test_of_two_starts_the_map_of_less_energy_and_seam_stays(runs, mesh, price) -> None:
+    made = Unwrap(price=price).parameterize(mesh, seed=0)
+    assert len(runs) == 2
+    costs = [run.energy + price * seam_of(run, mesh) for run in runs]
+    best = runs[int(np.argmin(costs))]
+    np.testing.assert_array_equal(made.corners, best.mesh.faces)
+
+
+def test_under_a_bound_the_shortest_of_three_seams_stays(runs) -> None:
+    made = Unwrap(max_distortion=4.6).parameterize(CAP, seed=0)
+    assert len(runs) == 3
+    met = [run for run in runs if run.energy <= 4.6]
+    assert made.report["end_energy"] == min(met, key=lambda run: run.rim).energy
+
+
+def test_a_map_without_a_seam_is_the_last(runs) -> None:
+    bent = irregular_disk()
+    for method in (Unwrap(), Unwrap(max_distortion=4.1)):
+        runs.clear()
+        method.parameterize(Mesh(bent.vertices * [1, 1, 0], bent.faces), seed=0)
+        assert len(runs) == 1
+
+
+@pytest.mark.parametrize("failing", [1, 2])
+def test_one_start_that_fails_is_none(monkeypatch, failing) -> None:
+    """As on a tube so thin that Tutte's embedding of its end collapses."""
+    begin, calls = descent.Run.begin, []
+
+    def one_fails(run):
+        calls.append(len(run.mesh.vertices))
+        if len(calls) == failing:
+            raise FlatteningError("collapsed")
+        begin(run)
+
+    monkeypatch.setattr(descent.Run, "begin", one_fails)
+    result = Unwrap().parameterize(CAP, seed=0)
+    assert len(calls) >= 2
+    assert ("not_asked" in result.report["computed"]) == (failing == 2)
+    assert evaluate(CAP, result)["bijective"] == 1
+
+
+def test_where_all_starts_fail_the_last_fault_is_told(monkeypatch) -> None:
+    def fails(_):
+        raise FlatteningError("collapsed")
+
+    monkeypatch.setattr(descent.Run, "begin", fails)
+    with pytest.raises(FlatteningError, match="collapsed"):
+        Unwrap().parameterize(CAP, seed=0)
+
+
+def test_no_second_start_begins_when_the_time_is_up(monkeypatch, runs) -> None:
+    now = [0.0]
+    monkeypatch.setattr(clock, "worked", lambda: now[0])
+    grown = Unwrap._grown
+
+    def slow(self, mesh, seam, deadline):
+        made = grown(self, mesh, seam, deadline)
+        now[0] += 100
+        return made
+
+    monkeypatch.setattr(Unwrap, "_grown", slow)
+    Unwrap(time_budget=50).parameterize(CAP, seed=0)
+    assert len(runs) == 1
+
+
+def test_where_no_map_tells_a_seam_the_automatic_cut_opens_the_mesh(monkeypatch):
+    def fails(*_):
+        raise ReconstructionError("no flat map")
+
+    monkeypatch.setattr(unwrap, "map_of_faces", fails)
+    result = Unwrap(price=None).parameterize(sphere(), seed=0)
+    assert result.report["computed"] == {"failed": "no flat map"}
+    automatic = cut_to_disk(sphere())
+    assert len(result.uv) == len(automatic.vertices)
