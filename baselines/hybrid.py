@@ -19,7 +19,7 @@ from parapoint.unwrapping.given import unwrapped_along
 class AutomaticSLIM:
     """An isometric map along the automatic cut, grown and kept one to one.
 
-    Held against that one it tells what the learned seam is worth, and what a longer seam is.
+    Held against `unwrap`, which begins so as well, it tells what the other start is worth.
 
     Attributes:
         price: as of `parapoint.unwrapping.unwrap.Unwrap`; None for the automatic cut as it is.

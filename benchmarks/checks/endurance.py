@@ -60,7 +60,6 @@ BUDGETS = {
     "geometry_image": "side=17",
     "meshed": "reconstruction=ball_pivoting",
     "smith_schaefer": "iterations=60",
-    "unwrap": "points=120",
 }
 """Parameters that make those methods short that would take minutes."""
 

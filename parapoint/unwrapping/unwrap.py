@@ -143,7 +143,7 @@ class Unwrap:
         self._keep_angles(run)
         report = {
             **run.report(),
-            "learned_seam_edges": int(seam.sum()),
+            "first_cut_edges": int(seam.sum()),
             "computed": computed,
         }
         return Parameterization(run.uv, run.mesh.faces, report=report)

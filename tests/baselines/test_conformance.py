@@ -19,7 +19,6 @@ COPY = (  # an external program: every vertex to its x and y
 )
 ARGUMENTS = {
     "computed": {"points": 150},
-    "unwrap": {"points": 120},
     "meshed": {"reconstruction": "ball_pivoting"},  # the faster one
     "textured": {"texels": 64},
     "external": {"command": COPY},

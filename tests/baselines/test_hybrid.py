@@ -212,7 +212,7 @@ def test_a_seam_is_computed_only_where_a_mesh_has_to_be_opened(monkeypatch):
     flat = Mesh(bent.vertices * [1, 1, 0], bent.faces)
     made = registry.method("unwrap")[1].parameterize(flat, seed=0)
     assert_allclose(made.report["end_energy"], 4, atol=1e-4)
-    assert made.report["learned_seam_edges"] == 0
+    assert made.report["first_cut_edges"] == 0
     assert not asked
     ball = builtin.sphere()
     for spec, mesh in (

@@ -342,7 +342,6 @@ PARAMETERS = {
         "seed": 0,
     },
     "unwrap": {
-        "points": None,
         "time_budget": None,
         "price": 1.0,
         "max_distortion": None,
