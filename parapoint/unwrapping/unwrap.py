@@ -14,7 +14,7 @@ import numpy as np
 
 from parapoint import clock
 from parapoint.computed.computed_map import ComputedMap
-from parapoint.computed.faces import map_of_faces
+from parapoint.computed.faces import is_even, map_of_faces
 from parapoint.computed.parts import DISTORTIONS, towards_conformal
 from parapoint.computed.reconstruction import ReconstructionError
 from parapoint.errors import InputError
@@ -56,10 +56,10 @@ class Unwrap:
 
     A mesh is begun along the least cut, none for a disk, with or without holes, and the automatic
     one (`parapoint.surfaces.cutting`) for others; and once more along the seam of the computed map
-    of its faces (`parapoint.computed.faces`), made a clean path of edges
-    (`parapoint.surfaces.across_seams`). The better map stays, by its energy and the price of its
-    seam: which start leads to it cannot be told before. Where the map must come below a bound on
-    the energy, it is begun along the seam of `ComputedMap` of points, too, and the shortest stays.
+    of its faces (`parapoint.computed.faces`), or of points of it where these are slender, made a
+    clean path of edges (`parapoint.surfaces.across_seams`). The better map stays, by its energy and
+    the price of its seam: which start leads to it cannot be told before. Where the map must come
+    below a bound on the energy, it is begun along the map of points, too, and the shortest stays.
     Where to a large mesh's seam grows is told by a simplified one (`parapoint.planar.coarse`), but
     under a bound, as the two differ in energy.
     Components are mapped one after another.
@@ -203,9 +203,11 @@ class Unwrap:
         def along_points(until: float) -> tuple[BoolArray, dict[str, object]]:
             return _seam(mesh, partial(_map_of_points, mesh, seed), until)
 
+        along_map = along_faces if is_even(mesh) else along_points
         if not self._grows:
-            return [along_faces]
-        return [least, along_faces, *[along_points] * (self.max_distortion is not None)]
+            return [along_map]
+        is_bounded = self.max_distortion is not None
+        return list(dict.fromkeys([least, along_map, *[along_points] * is_bounded]))
 
     def _cost(self, run: Run) -> tuple[bool, float]:
         """By which of two maps is worse: one that lacks something, or costs more."""

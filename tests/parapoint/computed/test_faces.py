@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.cases import builtin
 from parapoint.computed import faces
-from parapoint.computed.faces import comparable, map_of_faces
+from parapoint.computed.faces import comparable, is_even, map_of_faces
 from parapoint.computed.reconstruction import ReconstructionError
 from parapoint.surfaces.surface import Mesh
 from parapoint.testing import irregular_disk, sphere
@@ -40,6 +40,22 @@ def test_a_sphere_is_cut_open() -> None:
     stretch = np.linalg.norm(np.diff(uv[ball.edges], axis=1)[:, 0], axis=1)
     stretch /= np.linalg.norm(np.diff(ball.vertices[ball.edges], axis=1)[:, 0], axis=1)
     assert 0.01 < (stretch > 3 * np.median(stretch)).mean() < 0.3  # the edges across the seam
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_slender_faces_make_a_mesh_uneven(unit) -> None:
+    angle = np.linspace(0, np.pi, 33)
+    ring = np.column_stack([np.cos(angle), np.sin(angle)])
+
+    def pipe(length: float) -> Mesh:
+        ends = [np.column_stack([ring, np.full(33, z)]) for z in (0.0, length)]
+        return Mesh(unit * np.concatenate(ends), builtin.grid_faces(2, 33))
+
+    assert is_even(Mesh(unit * CUBE.vertices, CUBE.faces))
+    assert is_even(pipe(1.0))
+    # The edges of 64 equal triangles on a pipe of length L are 0.34 sqrt(L) long.
+    assert is_even(pipe(11.0))
+    assert not is_even(pipe(12.0))
 
 
 def test_a_coarse_mesh_is_refined_and_keeps_its_vertices_first() -> None:

@@ -60,6 +60,17 @@ def test_under_a_bound_the_shortest_of_three_seams_stays(runs) -> None:
     assert made.report["end_energy"] == min(met, key=lambda run: run.rim).energy
 
 
+def test_slender_faces_are_opened_along_a_map_of_points(monkeypatch) -> None:
+    def stop(*_):
+        raise InterruptedError
+
+    stretched = Mesh(CAP.vertices * [1, 1, 500], CAP.faces)
+    monkeypatch.setattr(unwrap, "map_of_faces", stop)
+    Unwrap(price=None).parameterize(stretched, seed=0)
+    with pytest.raises(InterruptedError):
+        Unwrap(price=None).parameterize(CAP, seed=0)
+
+
 def test_a_map_without_a_seam_is_the_last(runs) -> None:
     bent = irregular_disk()
     for method in (Unwrap(), Unwrap(max_distortion=4.1)):
