@@ -165,7 +165,9 @@ class Unwrap:
     ) -> tuple[Run, BoolArray, dict[str, object]]:
         """The best of the maps grown from all starts, its edges cut at first (E,), what told where.
 
-        The starts share the time. One that needs no cut is the last: no other can be shorter.
+        A start begins only where as much time is left as another has taken. One that needs no cut
+        is the last: no other can be shorter. Under a bound, where one may take all the time that
+        there is, they share it.
 
         Raises:
             FlatteningError: no start has a map without flips.
@@ -173,17 +175,20 @@ class Unwrap:
         starts = self._starts(mesh, seed)
         fault = FlatteningError("there was no time for a start")
         best: tuple[Run, BoolArray, dict[str, object]] | None = None
+        longest = 0.0
         for number, start in enumerate(starts):
-            now = clock.worked()
-            if best is not None and now > deadline:
+            begun = clock.worked()
+            if best is not None and begun + longest > deadline:
                 break
-            share = now + (deadline - now) / (len(starts) - number)
+            share = len(starts) - number if self.max_distortion is not None else 1
+            until = begun + (deadline - begun) / share
             try:
-                seam, told = start(share)
-                found = self._grown(mesh, seam, share), seam, told
+                seam, told = start(until)
+                found = self._grown(mesh, seam, until), seam, told
             except FlatteningError as error:  # such as too thin for a start: others are cut
                 fault = error
                 continue
+            longest = max(longest, clock.worked() - begun)
             best = found if best is None else min(best, found, key=lambda one: self._cost(one[0]))
             if not (seam.any() or found[0].branches or self._need.of(found[0])):
                 break

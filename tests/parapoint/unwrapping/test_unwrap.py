@@ -106,7 +106,10 @@ def test_where_all_starts_fail_the_last_fault_is_told(monkeypatch) -> None:
         Unwrap().parameterize(CAP, seed=0)
 
 
-def test_no_second_start_begins_when_the_time_is_up(monkeypatch, runs) -> None:
+@pytest.mark.parametrize(("budget", "starts"), [(50, 1), (200, 1), (250, 2), (None, 2)])
+def test_a_start_begins_where_as_much_time_is_left_as_another_took(
+    monkeypatch, runs, budget, starts
+) -> None:
     now = [0.0]
     monkeypatch.setattr(clock, "worked", lambda: now[0])
     grown = Unwrap._grown
@@ -117,8 +120,8 @@ def test_no_second_start_begins_when_the_time_is_up(monkeypatch, runs) -> None:
         return made
 
     monkeypatch.setattr(Unwrap, "_grown", slow)
-    Unwrap(time_budget=50).parameterize(CAP, seed=0)
-    assert len(runs) == 1
+    Unwrap(time_budget=budget).parameterize(CAP, seed=0)
+    assert len(runs) == starts
 
 
 def test_where_no_map_tells_a_seam_the_automatic_cut_opens_the_mesh(monkeypatch):
