@@ -28,9 +28,9 @@ from parapoint.unwrapping.unwrap import Unwrap
 
 logger = logging.getLogger("parapoint")
 
-SECONDS_OF_A_FACE, GROWTH = 5e-5, 1.2
+SECONDS_OF_A_FACE, GROWTH = 7e-5, 1.2
 """What unwrapping takes, for the progress bar: the first number times the faces to the power of the
-second gives the seconds of one idle core, 7 for 20,000 faces and 50 for 100,000."""
+second gives the seconds of one idle core, 10 for 20,000 faces and 70 for 100,000."""
 Y_UP = (".obj", ".glb", ".gltf")
 """Endings of files in which y is upwards by rule or by custom; in others it is z."""
 
