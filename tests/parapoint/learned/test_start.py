@@ -33,7 +33,7 @@ def slit(side: int = 41) -> Flattened:
     origin = np.empty(len(disk.vertices), dtype=np.int64)
     origin[disk.faces] = mesh.faces
     return Flattened(
-        np.arange(side * side), np.arange(0), mesh, disk, origin, disk.vertices[:, :2], False
+        np.arange(side * side), np.arange(0), 0, mesh, disk, origin, disk.vertices[:, :2], False
     )
 
 
@@ -77,7 +77,7 @@ def test_a_gate_jumps_across_the_slit_and_nowhere_else() -> None:
 def test_a_surface_without_a_cut_has_no_seam() -> None:
     mesh = sheet(5)
     rows = np.arange(25)
-    assert seams(Flattened(rows, rows[:0], mesh, mesh, rows, mesh.vertices[:, :2], False)) == []
+    assert seams(Flattened(rows, rows[:0], 0, mesh, mesh, rows, mesh.vertices[:, :2], False)) == []
 
 
 @pytest.mark.parametrize(

@@ -256,9 +256,9 @@ def test_a_distortion_does_not_go_with_seams_that_are_given(box, tmp_path, capsy
 @pytest.mark.parametrize(
     ("method", "seconds"),
     [
-        (Unwrap(), 50.0),
+        (Unwrap(), 70.0),
         (Unwrap(time_budget=20.0), 20.0),
-        (Unwrap(time_budget=90.0), 50.0),
+        (Unwrap(time_budget=90.0), 70.0),
         (Unwrap(max_distortion=4.1), None),
         (Unwrap(max_distortion=4.1, time_budget=90.0), 90.0),
     ],
