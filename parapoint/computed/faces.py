@@ -21,14 +21,13 @@ LEAST_VERTICES = 3_000
 """A mesh of fewer vertices is refined: its own edges leave too little choice."""
 MOST_SPLITS = 2
 """How often a face is split in four at most: what has few faces has a simple shape."""
-
 LONGEST = 10.0
 """A mesh is uneven with an edge longer than this many of those of as many equal triangles, as the
 slender faces of CAD parts have: 16 on two of them, at most 8 on 45 scanned or modelled surfaces."""
 
 
 def is_even(mesh: Mesh) -> bool:
-    """Whether the faces are even enough that seams along their edges are worth comparing."""
+    """Whether the faces are even enough for a map of their own."""
     ends = mesh.vertices[mesh.edges]
     longest = float(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).max())
     equal = math.sqrt(4 / math.sqrt(3) * float(mesh.face_areas.mean()))
