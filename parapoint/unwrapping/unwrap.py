@@ -173,7 +173,6 @@ class Unwrap:
             FlatteningError: no start has a map without flips.
         """
         starts = self._starts(mesh, seed)
-        fault = FlatteningError("there was no time for a start")
         best: tuple[Run, BoolArray, dict[str, object]] | None = None
         longest = 0.0
         for number, start in enumerate(starts):
@@ -185,22 +184,22 @@ class Unwrap:
             try:
                 seam, told = start(until)
                 found = self._grown(mesh, seam, until), seam, told
-            except FlatteningError as error:  # such as too thin for a start: others are cut
-                fault = error
+            except FlatteningError:  # such as too thin for a start: others are cut
+                if best is None and number + 1 == len(starts):
+                    raise
                 continue
             longest = max(longest, clock.worked() - begun)
             best = found if best is None else min(best, found, key=lambda one: self._cost(one[0]))
             if not (seam.any() or found[0].branches or self._need.of(found[0])):
                 break
-        if best is None:
-            raise fault
+        assert best is not None
         return best
 
     def _starts(self, mesh: Mesh, seed: int) -> list[Start]:
         """The ways to begin, those that take less time first."""
 
         def least(_: float) -> tuple[BoolArray, dict[str, object]]:
-            return _least_cut(mesh), {"not_asked": "the mesh is opened along the automatic cut"}
+            return _least_cut(mesh), {"not_asked": "the map begins along the least cut"}
 
         def along_faces(until: float) -> tuple[BoolArray, dict[str, object]]:
             return _seam(mesh, partial(map_of_faces, mesh), until)

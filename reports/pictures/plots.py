@@ -131,9 +131,9 @@ def convergence(
     made, places = small_multiples(len(curves))
     for place, (case, lines) in zip(places, curves.items(), strict=True):
         for label, known in lines:
-            of_all = 100 if metric == FLIPPED_OFF_SEAM else 1
+            percent = 100 if metric == FLIPPED_OFF_SEAM else 1
             place.plot(
-                known["seconds"], of_all * known[metric], label=label.short, markersize=3.5,
+                known["seconds"], percent * known[metric], label=label.short, markersize=3.5,
                 **look(contents, label),
             )  # fmt: skip
         place.set_xscale("log")
