@@ -6,13 +6,14 @@ the branches are taken over: on the large mesh they are joined to the seam along
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import igl
 import numpy as np
 from scipy.sparse import csgraph
 
 from parapoint.planar.descent import Run
 from parapoint.planar.domains import FlatteningError
-from parapoint.planar.embedding import embeddable
 from parapoint.planar.growth import Need, grown
 from parapoint.surfaces.cutting import cut_along, edge_graph, edge_lengths, path_to
 from parapoint.surfaces.surface import IntArray, Mesh, flat_faces
@@ -23,10 +24,25 @@ LARGE = 8_000
 """Faces from which on a mesh is simplified: below, its own growth takes a few seconds."""
 
 
-def grown_as_coarse(mesh: Mesh, need: Need, deadline: float) -> tuple[Mesh, tuple[int, ...]]:
-    """The large mesh cut to where the seam of the simplified one grew, and the branches' tips.
+@dataclass(frozen=True, eq=False)
+class Led:
+    """A large mesh, its seam led on as that of its simplified one.
 
-    The mesh stays as it is where the simplified one has no map, or its seam does not grow.
+    Attributes:
+        domain: the large mesh, cut to where the seam of the simplified one grew.
+        tips: the vertices to which its branches lead, in order.
+        run: the map of the simplified mesh.
+    """
+
+    domain: Mesh
+    tips: tuple[int, ...]
+    run: Run
+
+
+def led(mesh: Mesh, need: Need, deadline: float) -> Led | None:
+    """The large mesh cut to where the seam of the simplified one grew.
+
+    None where the simplified mesh has no map.
 
     Args:
         mesh: a planar domain.
@@ -35,16 +51,17 @@ def grown_as_coarse(mesh: Mesh, need: Need, deadline: float) -> tuple[Mesh, tupl
     """
     simple = simplified(mesh, COARSE)
     if simple is None:
-        return mesh, ()
+        return None
     coarse, vertex = simple
-    guess = Run(coarse, deadline)
+    run = Run(coarse, deadline)
     try:
-        guess.begin()
+        run.begin()
     except FlatteningError:
-        return mesh, ()
-    guess.improve()
-    tips = vertex[list(grown(guess, need).tips)].tolist()
-    return embeddable(joined(mesh, tips)), tuple(tips)
+        return None
+    run.improve()
+    run = grown(run, need)
+    tips = vertex[list(run.tips)].tolist()
+    return Led(joined(mesh, tips), tuple(tips), run)
 
 
 def simplified(mesh: Mesh, count: int) -> tuple[Mesh, IntArray] | None:

@@ -20,7 +20,7 @@ from parapoint.computed.reconstruction import ReconstructionError
 from parapoint.errors import InputError
 from parapoint.method import UnsupportedError
 from parapoint.parameters import LONGEST_SECONDS, check_choice, check_number
-from parapoint.planar.coarse import LARGE, grown_as_coarse
+from parapoint.planar.coarse import COARSE, LARGE, Led, led
 from parapoint.planar.descent import LEAST_ENERGY, Run, sound
 from parapoint.planar.domains import FlatteningError
 from parapoint.planar.embedding import embeddable
@@ -45,6 +45,23 @@ Start = Callable[[float], tuple[BoolArray, dict[str, object]]]
 """Gives the edges (E,) to be cut at first, by a time of `clock.worked`, and what told them."""
 
 
+@dataclass(frozen=True, eq=False)
+class Begun:
+    """A mesh cut open along a start, and the map that tells how good this start is.
+
+    Attributes:
+        seam: (E,) the edges of the mesh that were cut at first.
+        told: what told where.
+        run: the map.
+        led: the large mesh, where the map is that of its simplified one; otherwise None.
+    """
+
+    seam: BoolArray
+    told: dict[str, object]
+    run: Run
+    led: Led | None
+
+
 @dataclass(frozen=True)
 class Unwrap:
     """An isometric map of the mesh, cut along a clean path of edges; no flips, one to one.
@@ -60,8 +77,8 @@ class Unwrap:
     clean path of edges (`parapoint.surfaces.across_seams`). The better map stays, by its energy and
     the price of its seam: which start leads to it cannot be told before. Where the map must come
     below a bound on the energy, it is begun along the map of points, too, and the shortest stays.
-    Where to a large mesh's seam grows is told by a simplified one (`parapoint.planar.coarse`), but
-    under a bound, as the two differ in energy.
+    Of a large mesh a simplified one tells which start is the better, and where to the seam grows
+    (`parapoint.planar.coarse`), but under a bound, as the two differ in energy.
     Components are mapped one after another.
 
     Attributes:
@@ -136,15 +153,16 @@ class Unwrap:
         deadline = math.inf
         if self.time_budget is not None:
             deadline = clock.worked() + STEPPING * self.time_budget
-        run, seam, computed = self._begun(mesh, seed, deadline)
+        begun = self._begun(mesh, seed, deadline)
+        run = begun.run
         run.deadline = deadline
         if self._grows:
             run.improve()
         self._keep_angles(run)
         report = {
             **run.report(),
-            "first_cut_edges": int(seam.sum()),
-            "computed": computed,
+            "first_cut_edges": int(begun.seam.sum()),
+            "computed": begun.told,
         }
         return Parameterization(run.uv, run.mesh.faces, report=report)
 
@@ -160,10 +178,8 @@ class Unwrap:
             return Need(math.inf, most_energy=self.max_distortion)
         return Need(PRICE if self.price is None else self.price)
 
-    def _begun(
-        self, mesh: Mesh, seed: int, deadline: float
-    ) -> tuple[Run, BoolArray, dict[str, object]]:
-        """The best of the maps grown from all starts, its edges cut at first (E,), what told where.
+    def _begun(self, mesh: Mesh, seed: int, deadline: float) -> Begun:
+        """The best of the maps grown from all starts.
 
         A start begins only where as much time is left as another has taken. One that needs no cut
         is the last: no other can be shorter. Under a bound, where one may take all the time that
@@ -173,27 +189,30 @@ class Unwrap:
             FlatteningError: no start has a map without flips.
         """
         starts = self._starts(mesh, seed)
-        best: tuple[Run, BoolArray, dict[str, object]] | None = None
-        longest = 0.0
+        found: list[Begun] = []
+        longest, fault = 0.0, FlatteningError("no start without flips was found")
         for number, start in enumerate(starts):
-            begun = clock.worked()
-            if best is not None and begun + longest > deadline:
+            before = clock.worked()
+            if found and before + longest > deadline:
                 break
             share = len(starts) - number if self.max_distortion is not None else 1
-            until = begun + (deadline - begun) / share
+            until = before + (deadline - before) / share
             try:
-                seam, told = start(until)
-                found = self._grown(mesh, seam, until), seam, told
-            except FlatteningError:  # such as too thin for a start: others are cut
-                if best is None and number + 1 == len(starts):
-                    raise
+                one = self._tried(mesh, start, until)
+            except FlatteningError as error:  # such as too thin for a start: others are cut
+                fault = error
                 continue
-            longest = max(longest, clock.worked() - begun)
-            best = found if best is None else min(best, found, key=lambda one: self._cost(one[0]))
-            if not (seam.any() or found[0].branches or self._need.of(found[0])):
+            found.append(one)
+            ahead = 1.0 if one.led is None else len(mesh.faces) / COARSE
+            longest = max(longest, ahead * (clock.worked() - before))
+            if not (one.seam.any() or one.run.branches or self._need.of(one.run)):
                 break
-        assert best is not None
-        return best
+        for one in sorted(found, key=lambda one: self._cost(one.run)):
+            try:
+                return self._whole(one, deadline)
+            except FlatteningError as error:
+                fault = error
+        raise fault
 
     def _starts(self, mesh: Mesh, seed: int) -> list[Start]:
         """The ways to begin, those that take less time first."""
@@ -220,26 +239,39 @@ class Unwrap:
         price = PRICE if self.price is None else self.price
         return self._need.of(run), run.energy + price * run.rim / (2 * run.unit)
 
-    def _grown(self, mesh: Mesh, seam: BoolArray, deadline: float) -> Run:
-        """The settled map of the mesh cut along some edges (E,), and on from there.
+    def _tried(self, mesh: Mesh, start: Start, deadline: float) -> Begun:
+        """The mesh cut open along a start, and its map, or that of a simplified mesh.
 
-        Args:
-            mesh: what is to be mapped.
-            seam: edges that make a planar domain of it.
-            deadline: no step begins after this time of `clock.worked`.
+        Raises:
+            FlatteningError: it has no map without flips.
         """
-        is_large = len(mesh.faces) > LARGE and self.max_distortion is None
+        seam, told = start(deadline)
         domain = embeddable(cut_along(mesh, mesh.edges[seam]))
-        tips: tuple[int, ...] = ()
-        if self._grows and is_large:
-            domain, tips = grown_as_coarse(domain, self._need, deadline)
-        run = Run(domain, deadline)
-        run.tips = tips
-        run.begin()
-        run.improve()
-        if not self._grows or (is_large and not self._need.of(run)):
-            return run
-        return grown(run, self._need)
+        if self._is_led(mesh):
+            guess = led(domain, self._need, deadline)
+            if guess is not None:
+                return Begun(seam, told, guess.run, guess)
+        run = _settled(domain, (), deadline)
+        if self._grows and (not self._is_led(mesh) or self._need.of(run)):
+            run = grown(run, self._need)
+        return Begun(seam, told, run, None)
+
+    def _whole(self, begun: Begun, deadline: float) -> Begun:
+        """The map of the whole mesh, where that of a simplified one has told how good a start is.
+
+        Raises:
+            FlatteningError: it has no map without flips.
+        """
+        if begun.led is None:
+            return begun
+        run = _settled(embeddable(begun.led.domain), begun.led.tips, deadline)
+        if self._need.of(run):
+            run = grown(run, self._need)
+        return Begun(begun.seam, begun.told, run, None)
+
+    def _is_led(self, mesh: Mesh) -> bool:
+        """Whether a simplified mesh tells where to the seam grows."""
+        return self._grows and self.max_distortion is None and len(mesh.faces) > LARGE
 
     def _keep_angles(self, run: Run) -> None:
         """Move the map down the conformal energy as far as `distortion` says."""
@@ -249,6 +281,19 @@ class Unwrap:
         unit = of_area_one(run.mesh.vertices, run.mesh.faces)
         uv = towards_conformal(unit, run.uv / run.unit, run.deadline, most_starved)
         run.take(run.unit * uv, run.start)
+
+
+def _settled(domain: Mesh, tips: tuple[int, ...], deadline: float) -> Run:
+    """The settled map of a planar domain, to whose `tips` branches of its seam have grown.
+
+    Raises:
+        FlatteningError: it has no map without flips.
+    """
+    run = Run(domain, deadline)
+    run.tips = tips
+    run.begin()
+    run.improve()
+    return run
 
 
 def _seam(

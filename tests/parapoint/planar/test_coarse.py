@@ -8,7 +8,7 @@ import pytest
 from benchmarks.cases import builtin
 from benchmarks.metrics.evaluation import evaluate
 from parapoint.planar import coarse
-from parapoint.planar.coarse import grown_as_coarse, joined, simplified
+from parapoint.planar.coarse import joined, led, simplified
 from parapoint.planar.descent import Run
 from parapoint.planar.domains import FlatteningError
 from parapoint.planar.growth import Need, grown
@@ -33,40 +33,40 @@ def test_a_simplified_mesh_has_vertices_of_the_large_one(few) -> None:
     assert (simple.vertices == mesh.vertices[vertex]).all()
 
 
-@pytest.mark.usefixtures("few")
-def test_the_seam_grows_to_where_that_of_the_simplified_mesh_did() -> None:
+def test_the_seam_grows_to_where_that_of_the_simplified_mesh_did(few) -> None:
     mesh = builtin.finger()
     run = Run(mesh)
     run.begin()
     run.improve()
     need = Need(1e9)
     assert need.of(run)
-    domain, tips = grown_as_coarse(mesh, need, np.inf)
-    assert len(tips) >= 1
+    found = led(mesh, need, np.inf)
+    assert found is not None
+    assert len(found.tips) == found.run.branches >= 1
+    assert len(found.run.mesh.faces) == few
+    domain = found.domain
     longer, slow = Run(domain), grown(run, need)
     longer.begin()
     longer.improve()
     assert not need.of(longer)
     assert longer.energy < 1.2 * slow.energy
     assert longer.rim - run.rim < 1.3 * (slow.rim - run.rim)
-    found = evaluate(mesh, Parameterization(longer.uv, domain.faces))
-    assert found["flipped_fraction"] == found["overlap_area"] == 0
-    assert grown_as_coarse(domain, need, np.inf) == (domain, ())
+    metrics = evaluate(mesh, Parameterization(longer.uv, domain.faces))
+    assert metrics["flipped_fraction"] == metrics["overlap_area"] == 0
+    again = led(domain, need, np.inf)
+    assert again is not None
+    assert again.tips == ()
+    assert (again.domain.faces == domain.faces).all()
 
 
 @pytest.mark.usefixtures("few")
-@pytest.mark.parametrize("lacks", ["mesh", "map", "branches"])
-def test_the_mesh_stays_as_it_is_where_the_simplified_one_tells_nothing(lacks, monkeypatch) -> None:
-    mesh = builtin.finger()
+@pytest.mark.parametrize("lacks", ["mesh", "map"])
+def test_a_simplified_mesh_without_a_map_tells_nothing(lacks, monkeypatch) -> None:
     if lacks == "mesh":
         monkeypatch.setattr(coarse, "simplified", lambda *_: None)
-    elif lacks == "map":
-        monkeypatch.setattr(Run, "begin", Mock(side_effect=FlatteningError("no start")))
     else:
-        monkeypatch.setattr(coarse, "grown", lambda run, _: run)
-    kept, tips = grown_as_coarse(mesh, Need(1e9), np.inf)
-    assert tips == ()
-    assert (kept.faces == mesh.faces).all()
+        monkeypatch.setattr(Run, "begin", Mock(side_effect=FlatteningError("no start")))
+    assert led(builtin.finger(), Need(1e9), np.inf) is None
 
 
 def test_branches_are_joined_to_the_seam_by_short_paths() -> None:

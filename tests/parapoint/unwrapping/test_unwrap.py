@@ -11,7 +11,7 @@ from benchmarks.cases import builtin
 from benchmarks.metrics.evaluation import evaluate
 from parapoint import clock
 from parapoint.computed.reconstruction import ReconstructionError
-from parapoint.planar import descent
+from parapoint.planar import coarse, descent
 from parapoint.planar.domains import FlatteningError
 from parapoint.surfaces.cutting import cut_to_disk
 from parapoint.surfaces.surface import Mesh
@@ -25,13 +25,29 @@ CAP = builtin.sphere_cap(150, rings=5)
 @pytest.fixture
 def runs(monkeypatch):
     """The maps grown from each start, as they come."""
-    grown, found = Unwrap._grown, []
+    tried, found = Unwrap._tried, []
 
-    def kept(self, mesh, seam, deadline):
-        found.append(grown(self, mesh, seam, deadline))
-        return found[-1]
+    def kept(self, mesh, start, deadline):
+        begun = tried(self, mesh, start, deadline)
+        found.append(begun.run)
+        return begun
 
-    monkeypatch.setattr(Unwrap, "_grown", kept)
+    monkeypatch.setattr(Unwrap, "_tried", kept)
+    return found
+
+
+@pytest.fixture
+def settled(monkeypatch):
+    """The faces of each whole mesh that was brought down; those above 100 faces are led by 60."""
+    monkeypatch.setattr(unwrap, "LARGE", 100)
+    monkeypatch.setattr(coarse, "COARSE", 60)
+    real, found = unwrap._settled, []
+
+    def kept(domain, tips, deadline):
+        found.append(len(domain.faces))
+        return real(domain, tips, deadline)
+
+    monkeypatch.setattr(unwrap, "_settled", kept)
     return found
 
 
@@ -115,14 +131,14 @@ def test_a_start_begins_where_as_much_time_is_left_as_another_took(
 ) -> None:
     now = [0.0]
     monkeypatch.setattr(clock, "worked", lambda: now[0])
-    grown = Unwrap._grown
+    tried = Unwrap._tried
 
-    def slow(self, mesh, seam, deadline):
-        made = grown(self, mesh, seam, deadline)
+    def slow(self, mesh, start, deadline):
+        made = tried(self, mesh, start, deadline)
         now[0] += 100
         return made
 
-    monkeypatch.setattr(Unwrap, "_grown", slow)
+    monkeypatch.setattr(Unwrap, "_tried", slow)
     Unwrap(time_budget=budget).parameterize(CAP, seed=0)
     assert len(runs) == starts
 
@@ -136,3 +152,46 @@ def test_where_no_map_tells_a_seam_the_automatic_cut_opens_the_mesh(monkeypatch)
     assert result.report["computed"] == {"failed": "no flat map"}
     automatic = cut_to_disk(sphere())
     assert len(result.uv) == len(automatic.vertices)
+
+
+def test_a_large_mesh_is_brought_down_from_the_better_start_alone(runs, settled) -> None:
+    mesh = sphere()
+    made = Unwrap().parameterize(mesh, seed=0)
+    assert [len(run.mesh.faces) for run in runs] == [60, 60]
+    assert settled == [len(mesh.faces)]
+    costs = [run.energy + seam_of(run, mesh) for run in runs]
+    is_least_cut = "not_asked" in made.report["computed"]
+    assert is_least_cut == (costs[0] < costs[1])
+    assert made.report["branches_added"] == runs[int(np.argmin(costs))].branches
+    assert evaluate(mesh, made)["bijective"] == 1
+
+
+def test_a_better_start_that_fails_leaves_a_large_mesh_to_the_other(
+    monkeypatch, runs, settled
+) -> None:
+    begin, calls = descent.Run.begin, []
+
+    def fails_once(run):
+        if len(run.mesh.faces) > 100:
+            calls.append(run)
+            if len(calls) == 1:
+                raise FlatteningError("collapsed")
+        begin(run)
+
+    monkeypatch.setattr(descent.Run, "begin", fails_once)
+    mesh = sphere()
+    made = Unwrap().parameterize(mesh, seed=0)
+    costs = [run.energy + seam_of(run, mesh) for run in runs]
+    assert ("not_asked" in made.report["computed"]) == (costs[0] > costs[1])
+    assert settled == [len(mesh.faces)] * 2
+
+
+def test_a_large_mesh_that_cannot_be_simplified_is_brought_down_from_both_starts(
+    monkeypatch, runs, settled
+) -> None:
+    monkeypatch.setattr(coarse, "simplified", lambda *_: None)
+    mesh = sphere()
+    made = Unwrap().parameterize(mesh, seed=0)
+    assert settled == [len(mesh.faces)] * 2
+    best = min(runs, key=lambda run: run.energy + seam_of(run, mesh))
+    np.testing.assert_array_equal(made.corners, best.mesh.faces)
