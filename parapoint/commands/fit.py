@@ -90,7 +90,7 @@ def _check_folder(folder: Path) -> None:
     there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
     if not there.is_dir():
         raise InputError(f"{there}: is a file; name a folder")
-    checked_target(there / "model.json", force=True)
+    checked_target(there / "model.json")
 
 
 def _how_to_go_on(out: str) -> str:

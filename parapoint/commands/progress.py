@@ -55,10 +55,12 @@ def bar() -> Iterator[Tell]:
             remaining = now.remaining
             if remaining is None and now.fraction:
                 remaining = (monotonic() - begun) * (1 - now.fraction) / now.fraction
+            drawn = progress.tasks[0]
+            # `update` would keep the total where none is given, and the time where a phase ended.
+            drawn.total, drawn.finished_time = None if now.fraction is None else 1.0, None
             progress.update(
                 task,
                 completed=now.fraction or 0.0,
-                total=None if now.fraction is None else 1.0,
                 description=now.phase,
                 end=None if remaining is None else monotonic() + remaining,
             )

@@ -78,7 +78,7 @@ def rewrite_obj(
     places: IntArray,
     *,
     material: str | None = None,
-    keeps_libraries: bool = True,
+    keeps_libraries: bool,
 ) -> int:
     """Copy an OBJ file line by line, with new vt lines and new vt indices at its faces.
 

@@ -18,7 +18,7 @@ MOST_CORNERS = 20_000
 """Corners that a polygon may have where no fan fills it: cutting it takes time by their square."""
 FEW_CORNERS = 16
 """Corners up to which a polygon is cut in no time, whatever its shape."""
-MOST_STEPS = 3e9
+MOST_STEPS = 3_000_000_000
 """Steps, the cube of the corners each, that polygons may take which touch or cross themselves; the
 bridge to a hole touches."""
 LEAST_PASSES = 160

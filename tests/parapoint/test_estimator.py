@@ -280,7 +280,7 @@ def test_the_time_that_remains_is_told_by_the_pace_of_the_steps(monkeypatch) -> 
     assert told == [0.0, *(round(0.5 * k / (k + 1) * (9 - k), 3) for k in range(1, 10))]
 
 
-def test_the_report_and_the_trace_say_what_was_done() -> None:
+def test_the_report_and_the_trace_say_what_was_done(caplog) -> None:
     cloud = PointCloud(paraboloid())
     result = ParaPoint(**TINY).parameterize(cloud, seed=5)
     expected = {"preset": "paper", "points": 150, "iterations": 6, "device": "cpu"}
@@ -294,9 +294,15 @@ def test_the_report_and_the_trace_say_what_was_done() -> None:
     maps = [point.uv for point in result.trace if point.uv is not None]
     assert len(maps) > 1
     assert all(uv.shape == (400, 2) for uv in maps)
+    assert "diverged" not in caplog.text
 
 
 def test_threads_are_as_before_after_a_fit() -> None:
     before = torch.get_num_threads()
-    ParaPoint(**TINY, threads=1).fit(paraboloid())
+    model = ParaPoint(**TINY, threads=1).fit(paraboloid())
     assert torch.get_num_threads() == before
+    assert model.report_["threads"] == 1
+
+
+def test_the_report_says_how_many_threads_torch_chose(fitted: ParaPoint) -> None:
+    assert fitted.report_["threads"] == torch.get_num_threads()

@@ -54,6 +54,14 @@ def test_a_module_that_is_not_there_is_an_error():
         sources.sources("parapoint.nothing")
 
 
+@pytest.mark.parametrize("given", ["2.13.0", "2.13.0+cpu"])
+def test_a_version_counts_without_the_name_of_its_build(given, monkeypatch):
+    monkeypatch.setattr(sources.metadata, "version", lambda _: given)
+    assert sources.version("torch") == "2.13.0"
+    monkeypatch.undo()
+    assert sources.version("no-such-package") == "absent"
+
+
 DEPENDENCIES = {
     "parapoint/surfaces/__init__.py": "parapoint.surfaces.cutting",
     "parapoint/surfaces/surface.py": "benchmarks.metrics.evaluation",

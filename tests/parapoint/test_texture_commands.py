@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from rich.console import Console
+from rich.progress import Progress as Bar
 
 from parapoint import ComputedMap, PointCloud, cli
 from parapoint.commands.output import write
@@ -162,6 +163,23 @@ def test_log_lines_stand_above_the_bar(monkeypatch) -> None:
     before, _, after = drawn.getvalue().partition("a line\n")
     assert before.endswith("\x1b[2K")  # the bar was wiped off the line
     assert "baking" in after
+
+
+def test_the_bar_fills_where_a_share_is_told_and_pulses_elsewhere(monkeypatch) -> None:
+    bars = []
+
+    class Kept(Bar):
+        def __init__(self, *columns, **options) -> None:
+            super().__init__(*columns, **options)
+            bars.append(self)
+
+    monkeypatch.setattr("parapoint.commands.progress.Bar", Kept)
+    with bar() as tell:
+        for share, total in ((None, None), (0.25, 1.0), (1.0, 1.0), (None, None)):
+            tell(Progress("baking", share))
+            (task,) = bars[0].tasks
+            assert (task.completed, task.total) == (share or 0.0, total)
+            assert task.finished == (share == 1)  # then its clock stands still
 
 
 def test_the_end_is_reckoned_from_the_share_that_is_done(monkeypatch) -> None:

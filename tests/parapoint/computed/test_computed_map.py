@@ -7,11 +7,12 @@ import sys
 import numpy as np
 import pytest
 
-from parapoint import ComputedMap, InputError, clock
+from parapoint import ComputedMap, InputError, PointCloud, clock
 from parapoint.computed import computed_map
 from parapoint.computed.flattening import FlatMap, flat_map
 from parapoint.computed.reconstruction import ReconstructionError
 from parapoint.estimator import load
+from parapoint.fitting import Session
 from parapoint.testing import check_method
 
 
@@ -116,6 +117,11 @@ def test_each_component_gets_a_map_and_they_stand_apart(tmp_path) -> None:
     np.testing.assert_allclose(model.inverse_transform(right), far, atol=1e-9)
     model.save(tmp_path)
     assert np.array_equal(load(tmp_path).transform(far), right)
+
+
+def test_a_part_of_a_surface_has_its_share_of_the_points() -> None:
+    part = PointCloud(paraboloid())
+    assert ComputedMap(points=600).fit_part(part, 0.5, Session()).report["points"] == 300
 
 
 def test_points_off_the_surface_are_counted_and_mapped_nowhere(caplog) -> None:

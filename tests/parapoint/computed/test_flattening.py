@@ -214,3 +214,11 @@ def test_the_map_from_the_other_side_is_its_mirror_image_and_its_own_again_from_
     np.testing.assert_array_equal(turned.turned().uv, flat.uv)
     held = turned.charted
     assert (signed_areas(held.map.uv, held.map.corners) > 0).all()
+
+
+def test_a_vertex_whose_faces_have_no_area_has_no_derivative() -> None:
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 0, 0]])
+    mesh = Mesh(points, [[0, 1, 2], [0, 3, 1]])
+    jacobians = _vertex_jacobians(mesh, points[:, :2])
+    np.testing.assert_allclose(jacobians[:3], np.tile(np.eye(2, 3), (3, 1, 1)), atol=1e-12)
+    np.testing.assert_array_equal(jacobians[3], 0)

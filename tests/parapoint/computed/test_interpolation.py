@@ -50,10 +50,14 @@ def test_weights_are_squares_of_inverse_distances_less_that_of_the_reach() -> No
 
 
 def test_where_the_last_distance_is_missing_the_reach_is_half_as_much_again_in_squares() -> None:
-    # Distances 1 and √2, so R² = 3.
+    # Distances 1 and √2, so R² = 3. A missing one counts for nothing at all.
     one, two = (1 - 1 / 3**0.5) ** 2, (1 / 2**0.5 - 1 / 3**0.5) ** 2
-    made = shepard_weights(np.array([[1.0, 2.0, np.inf]]))
-    np.testing.assert_allclose(made, [[one / (one + two), two / (one + two)]])
+    made = shepard_weights(np.array([[1.0, 2.0, np.inf, np.inf]]))
+    np.testing.assert_allclose(made, [[one / (one + two), two / (one + two), 0]])
+
+
+def test_distances_that_are_all_as_far_as_the_reach_weigh_alike() -> None:
+    np.testing.assert_allclose(shepard_weights(np.full((1, 4), 2.0)), [[1 / 3] * 3])
 
 
 def test_points_on_coinciding_anchors_have_finite_values() -> None:

@@ -1,12 +1,16 @@
 """Parts that a conformal map shrinks to nothing, and what becomes of them."""
 
+import math
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 
 from benchmarks.cases import builtin
 from benchmarks.metrics.evaluation import evaluate
+from parapoint.computed import parts
 from parapoint.computed.flattening import flattened
-from parapoint.computed.parts import parts_kept
+from parapoint.computed.parts import parts_kept, towards_conformal
 from parapoint.planar.bijection import bijective_map, is_bijective
 from parapoint.surfaces.areas import LEAST_PART, starved_share
 from parapoint.surfaces.parameterization import Parameterization
@@ -53,3 +57,20 @@ def test_a_map_that_starves_nothing_stays_conformal() -> None:
     disk, uv = parts_kept(flat.disk, flat.uv, "balanced")
     assert disk is flat.disk
     assert uv is flat.uv
+
+
+@pytest.mark.parametrize(("last", "steps"), [(0.495, 3), (0.48, 5)])
+def test_the_way_to_a_conformal_map_ends_once_a_step_gains_little(monkeypatch, last, steps) -> None:
+    """The excess is halved, and then falls by a hundredth or by four; two are little."""
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    mesh = Mesh(points, [[0, 1, 2], [0, 2, 3]])
+    uv = points[:, :2]
+    falls = iter([1.0, 0.5, last, 0.2, 0.1])
+
+    def down(*_: object) -> Iterator[FloatArray]:
+        for k in range(1, 6):
+            yield uv + k
+
+    monkeypatch.setattr(parts, "steps_down", down)
+    monkeypatch.setattr(parts, "excess", lambda *_: next(falls))
+    assert (towards_conformal(mesh, uv, math.inf) == uv + steps).all()

@@ -123,6 +123,10 @@ def test_neighbourhoods_grow_on_lines_alone() -> None:
     found = breadth(mixed)
     assert found is not None
     assert (found[:400] == NEAREST).mean() > 0.9
+    lines = thinned(mixed)
+    assert lines is not None
+    assert np.array_equal(lines.rows[:400], np.arange(400))  # what is no line is not thinned
+    assert (lines.gap[:400] == 0).mean() > 0.9
 
 
 def test_lines_are_thinned_to_what_the_next_line_shows() -> None:

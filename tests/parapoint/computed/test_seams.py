@@ -64,8 +64,8 @@ def test_a_tip_is_far_from_the_boundary_and_in_its_scale_from_the_mean(monkeypat
     assert np.abs(copied[copied[:, 2] > 0, :2] - 10).max() <= 1
 
 
-def test_a_flat_ring_stays_a_ring_though_its_hole_has_the_longer_boundary() -> None:
-    # Its outer loop turns by 2π, the star in its middle by −2π: so they are, and nothing is joined.
+def flat_ring() -> Mesh:
+    """A ring in a plane, whose hole is a star with the longer boundary."""
     turn = 2 * np.pi * np.arange(24) / 24
     rows = [np.where(np.arange(24) % 2, 1.9, 1.0), np.full(24, 2.2), np.full(24, 2.5)]
     ring = np.concatenate([np.stack([r * np.cos(turn), r * np.sin(turn)], axis=1) for r in rows])
@@ -74,9 +74,24 @@ def test_a_flat_ring_stays_a_ring_though_its_hole_has_the_longer_boundary() -> N
     faces = np.concatenate(
         [np.stack([a, b + 24, b], axis=1), np.stack([a, a + 24, b + 24], axis=1)]
     )
-    mesh = Mesh(np.pad(ring, ((0, 0), (0, 1))), faces)
+    return Mesh(np.pad(ring, ((0, 0), (0, 1))), faces)
+
+
+def test_a_flat_ring_stays_a_ring_though_its_hole_has_the_longer_boundary() -> None:
+    # Its outer loop turns by 2π, the star in its middle by −2π: so they are, and nothing is joined.
+    mesh = flat_ring()
     assert mesh.boundary_loops[0].max() < 24  # the star
     assert joined_loops(mesh) is mesh
+
+
+def test_a_handle_is_cut_open_and_a_hole_in_a_plane_is_not() -> None:
+    assert seamed(flat_ring()).topology == "genus 0 with 2 boundary loops"
+    torus = builtin.torus(12)
+    holed = Mesh(torus.vertices, torus.faces[1:])
+    assert (holed.genus, len(holed.boundary_loops)) == (1, 1)
+    opened = seamed(holed)
+    assert opened.genus == 0
+    assert opened.is_connected_surface
 
 
 def test_cuts_are_at_most_2_2_percent_of_the_faces_of_an_open_surface() -> None:

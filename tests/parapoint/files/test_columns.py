@@ -28,6 +28,15 @@ def test_a_first_column_numbers_the_rows_only_from_0_or_1(tmp_path, first):
         assert_array_equal(cloud.points, PLACES)
 
 
+@pytest.mark.parametrize(
+    ("last", "names"), [("0 1 0 7 8", ["column5", "intensity"]), ("0 1 0 7", [])]
+)
+def test_columns_that_not_all_lines_have_are_left_out(tmp_path, last, names):
+    cloud = read(tmp_path / "a.xyz", f"0 0 0 3 4\n1 0 0.5 5 6\n{last}\n")
+    assert_array_equal(cloud.points, [[0, 0, 0], [1, 0, 0.5], [0, 1, 0]])
+    assert sorted(cloud.attributes) == names
+
+
 @pytest.mark.parametrize(("most", "are_colours"), [(255, True), (256, False), (60_000, False)])
 def test_three_whole_columns_are_colours_up_to_255(tmp_path, most, are_colours):
     values = np.array([[0, 1, 2], [3, 4, most], [5, 6, 7], [8, 9, 10]])

@@ -74,3 +74,11 @@ def test_lists_that_run_out_of_the_file_are_refused(data, word, block, monkeypat
     for read in ply.ply, ply.opened:
         with pytest.raises(InputError, match=word):
             read(data)
+
+
+def test_empty_lists_may_be_all_that_is_left_of_a_file() -> None:
+    data = binary(2, b"\0\0", "property list uchar int vertex_indices\n")
+    column = ply.opened(data)[1][1].columns["vertex_indices"]
+    assert column.sizes is not None
+    assert column.sizes.tolist() == [0, 0]
+    assert len(column.values) == 0

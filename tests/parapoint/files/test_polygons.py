@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from parapoint.errors import InputError
 from parapoint.files.polygons import triangle_rows
@@ -52,6 +52,22 @@ def test_polygons_are_cut_together_as_each_alone():
         for start, ring in zip(starts, rings, strict=True)
     ]
     assert (together == np.concatenate(alone)).all()
+
+
+@pytest.mark.parametrize("unit", [1e-90, 1e90])
+def test_polygons_are_cut_alike_in_every_unit(unit: float) -> None:
+    """An arrowhead of four corners and one of five: products of their sides are no float64."""
+    ring = np.array([[0, 0], [2, -1], [0.5, 0], [2, 1], [0, 0], [2, -1], [0.5, 0], [2, 1], [1, 1]])
+    points = np.insert(ring, 2, 0.0, axis=1)
+    rows = [triangle_rows(of * points, np.array([4, 5]), np.arange(9)) for of in (1.0, unit)]
+    assert_array_equal(*rows)
+
+
+@pytest.mark.parametrize("turn", range(4))
+def test_a_quad_that_would_fold_is_a_fan_from_its_second_corner(turn: int) -> None:
+    arrow = np.roll([[0, 0, 0], [2, -1, 0], [0.5, 0, 0], [2, 1, 0.0]], turn, axis=0)
+    rows = triangle_rows(arrow, np.array([4]), np.arange(4))
+    assert rows.tolist() == ([[1, 2, 3], [1, 3, 0]] if turn % 2 else [[0, 1, 2], [0, 2, 3]])
 
 
 def test_corners_inside_straight_edges_keep_their_triangles():

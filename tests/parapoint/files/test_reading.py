@@ -18,7 +18,7 @@ from parapoint import InputError, Mesh, Parameterization, PointCloud
 from parapoint.files import point_writers
 from parapoint.files.mesh_writers import write_obj
 from parapoint.files.point_writers import write_points
-from parapoint.files.reading import FORMATS, read_parameterized, read_surface
+from parapoint.files.reading import FORMATS, has_faces, read_parameterized, read_surface
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
 TRIANGLES = [[0, 1, 2], [0, 2, 3]]
@@ -290,6 +290,14 @@ def test_ply_with_mixed_polygons_and_other_data(tmp_path, encoding):
     assert_array_equal(mesh.faces, [[0, 1, 2], [0, 2, 3], [0, 3, 4]])
     short = data.rsplit(b"\n", 3)[0] if encoding == "ascii" else data[:-30]
     fault(tmp_path, "b.ply", short)
+
+
+def test_ply_whose_lists_of_uv_are_all_empty_has_no_uv(tmp_path: Path) -> None:
+    header = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    header += "element face 1\nproperty list int int vertex_indices\n"
+    header += "property list uchar float texcoord"
+    data = ply_header("ascii", header) + b"0 0 0\n1 0 0\n0 1 0\n3 0 1 2 0\n"
+    assert "has no UV coordinates" in fault(tmp_path, "a.ply", data, read_parameterized)
 
 
 def test_ply_strips_turn_every_second_triangle_and_stop_at_minus_one(tmp_path):
@@ -740,3 +748,8 @@ def test_points_are_written_in_bounded_memory(ending, tmp_path, monkeypatch) -> 
         tracemalloc.stop()
     assert (tmp_path / f"parts{ending}").read_bytes() == (tmp_path / f"whole{ending}").read_bytes()
     assert peak < 2 * uv.nbytes  # one checked copy of uv, and 999 rows at a time
+
+
+@pytest.mark.parametrize(("text", "expected"), [("v 0 0 0\nf 1 1 1\n", True), ("v 0 0 0\n", False)])
+def test_a_file_is_known_to_have_faces(text: str, expected: bool, tmp_path: Path) -> None:
+    assert has_faces(saved(tmp_path, "a.obj", text)) is expected

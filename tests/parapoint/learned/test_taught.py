@@ -10,6 +10,7 @@ from numpy.testing import assert_array_equal
 
 from parapoint import ParaPoint
 from parapoint.learned import losses, parapoint
+from parapoint.learned import taught as teaching
 from parapoint.learned.batches import lattice
 from parapoint.learned.features import FLOOR, FeatureNetworks, Features, GatedCut
 from parapoint.learned.networks import ACTIVATIONS, SubNetworks
@@ -217,3 +218,14 @@ def test_a_killed_fit_from_a_computed_start_goes_on_where_it_was(
     model.fit(cap(), checkpoint=tmp_path, callback=lambda now: seen.append(now.iteration))
     assert seen == [0, 6, 7, 8]  # the start is computed again
     assert_array_equal(model.transform(cap()), whole)
+
+
+def test_gates_are_taught_for_a_share_of_the_time(
+    start: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    limits = []
+    monkeypatch.setattr(teaching, "teach_gates", lambda *given: limits.append(given[3:]))
+    for steps, budget in ((300, None), (10_000, 100.0)):
+        preset = replace(TINY, iterations=steps)
+        TaughtTrainer(start, preset, seed=0, device="cpu", time_budget=budget)
+    assert limits == [(300, np.inf), (teaching.GATE_STEPS, 6.0)]

@@ -36,3 +36,19 @@ def test_a_cut_that_crosses_itself_once_it_is_open_fails(monkeypatch) -> None:
     assert (longer.branches, run.branches) == (1, 0)
     monkeypatch.setattr(descent, "crossing_vertices", lambda *_: np.array([3]))
     assert run.cut(path) is None
+
+
+def test_the_map_along_a_longer_seam_is_the_same_in_any_unit() -> None:
+    cap = builtin.sphere_cap(120, rings=5)
+    energies = []
+    for unit in (1.0, 1000.0):
+        run = Run(Mesh(unit * cap.vertices, cap.faces))
+        run.begin()
+        run.improve()
+        longer = run.cut(np.array([0, 1, 7, 19]))
+        assert longer is not None
+        assert signed_areas(longer.uv, longer.mesh.faces).sum() == pytest.approx(
+            run.mesh.face_areas.sum(), rel=0.1
+        )
+        energies.append(longer.energy)
+    assert energies[0] == pytest.approx(energies[1], rel=1e-3)

@@ -1,5 +1,7 @@
 """Growth of the seam to where places are starved of area."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -53,3 +55,18 @@ def test_a_branch_that_only_pays_keeps_its_length(monkeypatch) -> None:
     need = Need(price=1.0, most_starved=0.02, most_energy=6.0)
     whole = Branching(4.1, 9)
     assert _shortened(whole, need) is whole
+
+
+@pytest.mark.parametrize(("length", "paid", "in_need"), [(0.1, 0.15, 0.02), (0.01, 0.015, 0.015)])
+def test_a_branch_pays_its_length_and_in_need_no_more_than_a_hundredth_of_the_excess(
+    monkeypatch, length: float, paid: float, in_need: float
+) -> None:
+    # A price of 3 for each sqrt(area), which is 2, and an energy of 2 above that of an isometry.
+    run = SimpleNamespace(energy=6.0, unit=2.0)
+    for is_starved, least in ((False, paid), (True, in_need)):
+        monkeypatch.setattr(Need, "is_starved", lambda *_, told=is_starved: told)
+        assert Need(price=3.0).least(run, length) == pytest.approx(least)
+        assert Need(price=3.0).may_grow(run)
+        assert Need(price=np.inf).may_grow(run) == is_starved
+        assert not Need(price=np.inf, most_energy=6.0).may_grow(run) or is_starved
+        assert Need(price=np.inf, most_energy=5.9).may_grow(run)

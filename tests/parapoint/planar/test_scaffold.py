@@ -1,11 +1,14 @@
 """Descents of a map that stays one to one, also from one whose boundary touches itself."""
 
+from collections.abc import Iterator
+
 import igl
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from benchmarks.cases import builtin
+from parapoint.planar import scaffold
 from parapoint.planar.bijection import is_bijective
 from parapoint.planar.scaffold import (
     cut_opened,
@@ -73,3 +76,33 @@ def test_a_cut_opens_where_that_lowers_the_energy() -> None:
     assert is_bijective(cut, opened)
     before = excess(mesh, uv, igl.SYMMETRIC_DIRICHLET)
     assert excess(cut, opened, igl.SYMMETRIC_DIRICHLET) < 0.9 * before
+
+
+@pytest.mark.parametrize(("last", "steps"), [(0.495, 3), (0.48, 5)])
+def test_a_descent_ends_once_a_step_gains_little(monkeypatch, last: float, steps: int) -> None:
+    """The excess is halved, and then falls by a hundredth or by four; two are little."""
+    mesh, uv = slit()
+    falls = iter([1.0, 0.5, last, 0.2, 0.1])
+
+    def down(*_: object) -> Iterator[np.ndarray]:
+        for k in range(1, 6):
+            yield uv + k
+
+    monkeypatch.setattr(scaffold, "steps_down", down)
+    monkeypatch.setattr(scaffold, "excess", lambda *_: next(falls))
+    assert_array_equal(descended(mesh, uv, igl.CONFORMAL), uv + steps)
+
+
+@pytest.mark.parametrize(("fall", "steps"), [(0.0005, 20), (0.002, 30)])
+def test_a_cut_has_twenty_steps_to_open_before_they_must_gain(monkeypatch, fall, steps) -> None:
+    """The excess of 1 falls by so much a step: in twenty steps by a hundredth, or by four."""
+    mesh, uv = slit()
+    falls = iter(1 - fall * np.arange(31))
+
+    def down(*_: object) -> Iterator[np.ndarray]:
+        for k in range(1, 31):
+            yield uv + k
+
+    monkeypatch.setattr(scaffold, "steps_down", down)
+    monkeypatch.setattr(scaffold, "excess", lambda *_: next(falls))
+    assert_array_equal(cut_opened(mesh, uv, igl.CONFORMAL), uv + steps)

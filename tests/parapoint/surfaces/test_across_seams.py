@@ -97,3 +97,42 @@ def test_the_pieces_of_an_edge_are_measured_one_by_one() -> None:
     np.testing.assert_allclose(found, np.concatenate([wanted[edge] for edge in edges]))
     whole = across_seams._piece_lengths(mesh, squared(mesh.vertices), None, np.ones(3, int))
     np.testing.assert_allclose(np.sort(whole), [4, 9, np.hypot(9, 4)])
+
+
+def test_an_edge_lies_across_where_one_of_its_pieces_does() -> None:
+    # Between the columns 10 and 11 the map goes far away and comes back: the ends tell nothing.
+    mesh = grid(21, 3)
+
+    def around(points: np.ndarray) -> np.ndarray:
+        return points[:, :2] + [100, 0] * (np.abs(points[:, :1] - 10.5) < 0.1)
+
+    uv = around(mesh.vertices)
+    spans = (mesh.vertices[mesh.edges, 0].sum(axis=1) == 21) & (
+        np.ptp(mesh.vertices[mesh.edges, 0], axis=1) == 1
+    )
+    assert not edges_across_seam(mesh, uv).any()
+    assert np.array_equal(edges_across_seam(mesh, uv, around, 0.25), spans)
+
+
+def test_a_face_with_all_edges_across_is_a_chart_in_the_scale_of_the_map() -> None:
+    mesh = grid(5, 5)
+    uv = 2 * mesh.vertices[:, :2]
+    across = np.zeros(len(mesh.edges), dtype=bool)
+    across[mesh.edge_of_halfedge[3 * 12 : 3 * 13]] = True
+    result = opened(mesh, uv, across)
+    a, b, c = (result.uv[result.corners[:, k]] for k in range(3))
+    first, second = b - a, c - a
+    doubled = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+    np.testing.assert_allclose(doubled, 4)
+    sides = np.linalg.norm([first[12], second[12], (c - b)[12]], axis=1)
+    np.testing.assert_allclose(np.sort(sides), [2, 2, 8**0.5])
+    assert np.bincount(result.corners.ravel())[result.corners[12]].tolist() == [1, 1, 1]
+
+
+def test_faces_that_all_lie_across_are_charts_as_large_as_in_space() -> None:
+    mesh = grid(3, 3)
+    result = opened(mesh, mesh.vertices[:, 1::-1], np.ones(len(mesh.edges), dtype=bool))
+    a, b, c = (result.uv[result.corners[:, k]] for k in range(3))
+    first, second = b - a, c - a
+    np.testing.assert_allclose(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0], 1)
+    assert len(np.unique(result.corners)) == 3 * len(mesh.faces)

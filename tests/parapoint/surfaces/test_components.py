@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from parapoint import Mesh, ParaPoint, PointCloud
-from parapoint.surfaces.components import cloud_labels, components
+from parapoint.surfaces.components import cloud_labels, components, parts_of
 from parapoint.testing import irregular_disk
 
 TINY = {"preset": "paper", "points": 400, "subset": 100, "iterations": 4, "device": "cpu"}
@@ -92,6 +92,17 @@ def test_the_largest_alone_is_fitted() -> None:
 def test_together_is_one_map_of_all() -> None:
     model = ParaPoint(**TINY).fit(spheres(300, 500))
     assert set(model.points_[:, 0] > 2.5) == {True, False}
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_that_several_components_get_one_map_is_said(count: int, caplog) -> None:
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    mesh = Mesh(
+        np.concatenate([points, points + 9])[: 3 * count], np.arange(3 * count).reshape(-1, 3)
+    )
+    (whole,) = parts_of(mesh, "together")
+    assert whole is mesh
+    assert caplog.text.count("2 components: one map is fitted") == count - 1
 
 
 def test_two_sheets_three_spacings_apart_are_two_components() -> None:

@@ -159,13 +159,16 @@ def test_cut_along_refuses_what_is_no_edge(edges):
         cut_along(irregular_disk(), edges)
 
 
-def test_a_torus_is_cut_where_it_is_narrowest():
-    # Its tube has a radius from 1/4, at the first vertex, to 1/2, across. The vertex farthest from
-    # the first one is the first root, and the farthest from that the second: the first one, where
-    # the shortest loop goes around the tube. The rest of the cut is the polygon inside the torus.
+@pytest.mark.parametrize(("waves", "sign"), [(1, -1), (2, 1)])
+def test_a_torus_is_cut_where_it_is_narrowest(waves, sign):
+    # Its tube has a radius from 1/4 to 1/2. With one wave it is narrow at the first vertex. The
+    # vertex farthest from that one is the first root, and the farthest from the root the second:
+    # the first one, where the shortest loop goes around the tube. With two waves it is wide there
+    # and across, and narrow between these, where the further roots are. The rest of the cut is the
+    # polygon inside the torus.
     i, j = np.divmod(np.arange(24 * 12), 12)
     a, b = 2 * np.pi * i / 24, 2 * np.pi * j / 12
-    tube = 0.375 - 0.125 * np.cos(a)
+    tube = 0.375 + sign * 0.125 * np.cos(waves * a)
     radius = 1 + tube * np.cos(b)
     points = np.stack([radius * np.cos(a), radius * np.sin(a), tube * np.sin(b)], axis=1)
     mesh = Mesh(points, torus().faces)

@@ -117,6 +117,23 @@ def test_clouds_of_noise_are_strays_and_patches_are_none(share: float, away: flo
     assert stray_points(np.concatenate([points, patch])).sum() == far * count
 
 
+@pytest.mark.parametrize(("side", "expected"), [(4, 20), (5, 0)])
+def test_of_many_points_a_group_of_a_two_hundredth_is_stray(side: int, expected: int) -> None:
+    """A flat patch of 20 of 4,020 points is, one of 25 of 4,025 is a part."""
+    x, y = np.meshgrid(np.arange(5.0), np.arange(side))
+    patch = np.stack([8 + 0.05 * x.ravel(), 0.05 * y.ravel(), np.zeros(x.size)], axis=1)
+    is_stray = stray_points(np.concatenate([dome(4000), patch]))
+    assert is_stray.sum() == is_stray[4000:].sum() == expected
+
+
+def test_what_hangs_together_at_the_corners_of_cells_is_one_group() -> None:
+    """The sixth neighbour is three steps off, so a cell is 90 √3 wide: two hold 155 steps each.
+
+    On either side of the middle five points are in a third cell, which is no more than a stray few.
+    """
+    assert not stray_points(np.arange(-316.0, 317)[:, None] * np.ones(3)).any()
+
+
 def test_two_objects_of_equal_size_are_no_strays() -> None:
     """However far they are apart; nor is a small one close by."""
     for away in (10, 1e3, 1e6):

@@ -83,6 +83,13 @@ def test_the_first_point_of_a_cube_stays() -> None:
     np.testing.assert_array_equal(few.points, points[[0, 3, 4]])
 
 
+def test_the_cubes_at_the_rim_of_space_are_as_good_as_others() -> None:
+    """The space around the square begins at -8; these are in its first cubes."""
+    points = np.array([[-9.0, -9, -9], [-7.3, -9, -9], [-6.8, -9, -9], [-9, -7.3, -9], [1, 1, 0]])
+    made, _ = thinned([PointCloud(points)], "position", SQUARE, 8)
+    np.testing.assert_array_equal(made.points, points)
+
+
 def test_where_the_map_is_large_more_points_stay() -> None:
     """The left half of the square fills four fifths of the texture."""
     middle = np.array([[4, 0, 0], [4, 8, 0.0]])
@@ -97,6 +104,18 @@ def test_where_the_map_is_large_more_points_stay() -> None:
     )
     left = made.points[:, 0] < 3.8
     assert left.sum() > 2 * (made.points[:, 0] > 4.2).sum()
+
+
+def test_faces_without_area_in_the_map_or_in_space_decide_nothing() -> None:
+    corners = np.concatenate([CORNERS, [[4, 4, 8], [4, 4, 0]]])
+    uv = np.concatenate([SQUARE.map.uv, [[0.5, 0.5], [0.6, 0.4]]])
+    faces = [*FACES.tolist(), [0, 4, 2], [0, 5, 2]]
+    more = Charted(Mesh(corners, faces), Parameterization(uv, faces))
+    points = np.random.default_rng(3).uniform(0, 8, (2000, 3))
+    made, alone = (
+        thinned([PointCloud(points)], "position", of, 8)[0].points for of in (more, SQUARE)
+    )
+    np.testing.assert_array_equal(made, alone)
 
 
 @pytest.mark.parametrize("far", [9.0, -9.0, 1e30, -1e30, 1.7e308])

@@ -75,6 +75,18 @@ def test_a_starved_part_is_seen_from_a_hundredth_of_the_surface_on(share, is_see
     assert found.smallest_part == pytest.approx(ratio if is_seen else 1)
 
 
+@pytest.mark.parametrize(("width", "starved"), [(1 / 8, 0.0), (0.12, 0.5)])
+def test_a_part_with_a_quarter_of_its_fair_area_is_not_starved(width, starved) -> None:
+    """Half of a square is drawn an eighth as wide as the square, or a little less."""
+    points = np.array([[0.0, 0, 0], [0.5, 0, 0], [0.5, 1, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0]])
+    faces = [[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2]]
+    uv = points[:, :2].copy()
+    uv[1:3, 0] = width
+    found = quality(Charted(Mesh(points, faces), Parameterization(uv, faces)), 64)
+    assert found.starved == starved
+    assert found.smallest_part == pytest.approx(2 * width if starved else 1)
+
+
 SQUARE = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
 RING = [[0, 1, 5], [0, 5, 4], [1, 2, 6], [1, 6, 5], [2, 3, 7], [2, 7, 6], [3, 0, 4], [3, 4, 7]]
 """The faces between two squares, the outer one first."""

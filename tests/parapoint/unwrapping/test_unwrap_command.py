@@ -5,11 +5,13 @@ import json
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from parapoint import cli
-from parapoint.commands.unwrapping import expected
+from parapoint.commands.telling import ADVICE_OF_MESHES, warn
+from parapoint.commands.unwrapping import Request, _warn_of_bound, expected
 from parapoint.files.reading import read_parameterized, read_surface
-from parapoint.surfaces.areas import LEAST_PART
+from parapoint.surfaces.areas import LEAST_PART, MOST_STARVED
 from parapoint.surfaces.surface import Mesh
 from parapoint.testing import irregular_disk
 from parapoint.unwrapping import unwrap
@@ -163,6 +165,35 @@ def test_a_bound_that_is_missed_is_said(tmp_path, capsys, caplog) -> None:
     assert status == 0
     assert "overlap: none" in out
     assert "above --max-distortion" in caplog.text
+
+
+@pytest.mark.parametrize(("name", "is_y_up"), [("box.obj", True), ("square.off", False)])
+def test_a_picture_of_a_mesh_is_opaque_and_upright(name, is_y_up, box, capsys, monkeypatch) -> None:
+    folder = box.parent
+    (folder / "colours.mtl").write_text("newmtl red\nmap_Kd clear.png\n")
+    Image.new("RGBA", (2, 2)).save(folder / "clear.png")
+    square = "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n"
+    (folder / "square.off").write_text(square)
+    seen = []
+    monkeypatch.setattr(
+        "parapoint.commands.unwrapping.write_preview",
+        lambda _, __, picture, *, is_y_up: seen.append((picture.shape[2], is_y_up)),
+    )
+    arguments = ["unwrap", folder / name, "--out", folder / "out.glb", "--texture", 16]
+    status, *_ = run([*arguments, "--preview", folder / "seen.png"], capsys)
+    assert status == 0
+    assert seen == [(3, is_y_up)]
+
+
+@pytest.mark.parametrize("more", [0.0, 1e-4])
+def test_a_map_at_a_bound_is_within_it(more, caplog) -> None:
+    facts = {"file": "a.obj", "flipped": 0, "overlap": "none"}
+    facts |= {"starved": MOST_STARVED + more, "energy": 4.1 + more}
+    warn(facts, ADVICE_OF_MESHES)
+    _warn_of_bound(facts, Request(Unwrap(max_distortion=4.1), border=0.0))
+    words = ["less than a quarter of its fair area", "above --max-distortion 4.1"] if more else []
+    assert len(caplog.messages) == len(words)
+    assert all(word in text for word, text in zip(words, caplog.messages, strict=True))
 
 
 def test_a_lower_bound_makes_a_longer_seam(monkeypatch) -> None:
