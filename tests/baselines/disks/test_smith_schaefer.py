@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from baselines.disks.barrier_energy import Boundary, Energy, turning_points
 from baselines.disks.quasi_newton import direction
 from baselines.disks.slim import SLIM
-from baselines.disks.smith_schaefer import SmithSchaefer
+from baselines.disks.smith_schaefer import SmithSchaefer, descent
 from parapoint.errors import InputError
 from parapoint.planar.crossing import crossing_vertices
 from parapoint.planar.domains import domain, signed_areas
@@ -111,6 +111,8 @@ def test_every_step_of_the_trace_is_one_to_one_and_lowers_the_energy():
     values = [point.values["symmetric_dirichlet"] for point in result.trace]
     assert values[-1] < values[0] - 0.5
     assert values[20] < 4.02  # down the slope alone it comes to 4.2 by then
+    isometric = SLIM(iterations=60).parameterize(mesh, seed=0)  # no part of it meets another
+    assert values[-1] == pytest.approx(isometric.report["end_energy"], abs=1e-6)
     assert [point.iteration for point in result.trace] == list(range(len(values)))
     assert values[-1] == result.report["end_energy"]
     assert_array_equal(result.trace[-1].uv, result.uv)
@@ -126,3 +128,62 @@ def test_a_descent_ends_at_its_time():
     assert not SmithSchaefer(time_budget=1.0).deterministic
     with pytest.raises(InputError, match="time_budget must be a number above 0"):
         SmithSchaefer(time_budget=0.0)
+
+
+def test_an_isometry_is_where_the_descent_ends_at_once():
+    """Tutte's embedding of a flat regular hexagon is the hexagon itself."""
+    angle = np.arange(6) * np.pi / 3
+    rim = np.stack([np.cos(angle), np.sin(angle), np.zeros(6)], axis=1)
+    faces = np.stack([np.full(6, 6), np.arange(6), (np.arange(6) + 1) % 6], axis=1)
+    mesh = Mesh(np.vstack([3 * rim, [[0, 0, 0]]]), faces)
+    report = SmithSchaefer().parameterize(mesh, seed=0).report
+    assert report["start_energy"] == pytest.approx(4)
+    assert report["iterations"] == 0
+
+
+def test_a_descent_ends_where_a_hundred_steps_bring_less_than_a_hundredth():
+    trace = SmithSchaefer().parameterize(irregular_disk(), seed=0).trace
+    excess = np.array([point.values["symmetric_dirichlet"] for point in trace]) - 4
+    settled = excess[100:] > 0.99 * excess[:-100]
+    assert np.flatnonzero(settled).tolist() == [len(trace) - 101]
+
+
+def test_a_step_goes_most_of_the_way_to_a_flip_and_one_at_most():
+    mesh = Mesh(np.array([[0, 0, 0], [1, 0, 0], [0, 1.0, 0]]), np.array([[0, 1, 2]]))
+    energy = Energy(domain(mesh), 1e-9)
+    down = np.array([[0, 0], [0, 0], [0, -4.0]])  # turns the triangle over after a quarter of it
+    assert energy.largest_step(mesh.vertices[:, :2], down) == pytest.approx(0.9 / 4)
+    assert energy.largest_step(mesh.vertices[:, :2], down / 400) == pytest.approx(1)
+    assert energy.largest_step(mesh.vertices[:, :2], -down) == pytest.approx(1)
+
+
+class Bowl:
+    """An energy with its minimum at 0, and no bound on steps."""
+
+    def __init__(self, steepness):
+        self.steepness = steepness
+
+    def of(self, uv):
+        value = 4 + self.steepness * (uv**2).sum()
+        return value, 2 * self.steepness * uv, value
+
+    def largest_step(self, *_):
+        return 1.0
+
+
+@pytest.mark.parametrize("steepness", [1e-3, 1e6])
+def test_the_first_step_is_as_long_however_steep_the_energy_is(steepness):
+    """The bottom is half a step away: a whole step brings nothing, half a step all."""
+    (_, start), (bottom, end) = descent(Bowl(steepness), np.array([[0.3, -0.5], [0.5, 0.1]]), 50)
+    assert start > end == pytest.approx(4)
+    assert_allclose(bottom, 0, atol=1e-12)
+
+
+def test_where_the_remembered_steps_mislead_the_slope_leads_on(monkeypatch):
+    monkeypatch.setattr(
+        "baselines.disks.smith_schaefer.direction",
+        lambda slope, pairs: slope if pairs else -slope,  # up, once there is something to remember
+    )
+    *_, (bottom, end) = descent(Bowl(1.0), np.array([[0.3, -0.4], [0.2, 0.1]]), 50)
+    assert end == pytest.approx(4, abs=1e-5)
+    assert_allclose(bottom, 0, atol=1e-2)
