@@ -171,3 +171,21 @@ def test_a_seed_that_is_no_face_or_has_no_area_is_refused():
         DAWand(triangle=176).parameterize(flat, seed=0)
     with pytest.raises(Exception, match="needs faces"):
         DAWand().parameterize(PointCloud(mesh.vertices), seed=0)
+
+
+@pytest.mark.parametrize(("degrees", "offset"), [(75, 0.1), (210, -0.3)])
+def test_smoothing_leaves_faces_where_they_are_with_as_many_inside_as_outside(degrees, offset):
+    """On an even border, here along a line across a square, some have just half around them."""
+    mesh = irregular_disk()
+    across = np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees)), 0])
+    below = np.flatnonzero(mesh.vertices[mesh.faces].mean(axis=1) @ across < offset).tolist()
+    region = Region(mesh, below[len(below) // 2])
+    for _ in range(20):
+        for face in below:
+            if region.fits(face):
+                region.add(face)
+    before = region.faces().tolist()
+    votes = (region.uses / region.valence)[mesh.faces].mean(axis=1)
+    assert (votes == 0.5).any()
+    region.smooth()
+    assert region.faces().tolist() == before
