@@ -12,7 +12,7 @@ from baselines.disks.slim import SLIM
 from baselines.disks.smith_schaefer import SmithSchaefer, descent
 from parapoint.errors import InputError
 from parapoint.planar.crossing import crossing_vertices
-from parapoint.planar.domains import domain, signed_areas
+from parapoint.planar.domains import FlatteningError, domain, signed_areas
 from parapoint.planar.tutte import tutte
 from parapoint.surfaces.surface import Mesh
 from parapoint.testing import irregular_disk
@@ -49,7 +49,8 @@ def test_the_energy_by_hand():
     mesh = Mesh(np.array([[0, 0, 0], [1, 0, 0], [0, 1.0, 0]]), np.array([[0, 1, 2]]))
     distortion = Energy(domain(mesh), 1e-9).of(mesh.vertices[:, :2] * [2, 1])[2]
     assert distortion == pytest.approx(4 + 1 + 1 / 4 + 1)
-    assert Energy(domain(mesh), 1e-9).of(mesh.vertices[:, :2] * [-2, 1])[2] == np.inf
+    for flat in (-2, 0):
+        assert Energy(domain(mesh), 1e-9).of(mesh.vertices[:, :2] * [flat, 1])[2] == np.inf
 
 
 def test_the_barrier_by_hand():
@@ -57,6 +58,16 @@ def test_the_barrier_by_hand():
     mesh = Mesh(np.array([[0, 0, 0], [1, 0, 0], [0.5, 0.5, 0]]), np.array([[0, 1, 2]]))
     boundary = Boundary(domain(mesh), 0.6)
     assert boundary.barrier(mesh.vertices[:, :2])[0] == pytest.approx(0.2**2 / 3)
+
+
+@pytest.mark.parametrize("across", [1, -1])
+def test_past_its_ends_an_edge_is_as_far_as_its_nearer_end(across):
+    """The tip lies half an edge past one end: 0.3 from the line, √0.34 from the edge."""
+    tip = 0.5 + across
+    mesh = Mesh(np.array([[0, 0, 0], [1, 0, 0], [tip, 0.3, 0]]), np.array([[0, 1, 2]]))
+    height = 0.3 / np.hypot(1.5, 0.3)  # of the end between the two others, over the longest edge
+    found = Boundary(domain(mesh), 0.6).barrier(mesh.vertices[:, :2])[0]
+    assert found == pytest.approx(((0.6 / 0.34**0.5 - 1) ** 2 + (0.6 / height - 1) ** 2) / 3)
 
 
 def test_a_triangle_turns_over_where_the_root_says():
@@ -179,6 +190,29 @@ def test_the_first_step_is_as_long_however_steep_the_energy_is(steepness):
     assert_allclose(bottom, 0, atol=1e-12)
 
 
+class Pit(Bowl):
+    """Flat far away: towards the pit the slope grows at first, and falls near its bottom."""
+
+    def of(self, uv):
+        depth = np.exp(-(uv**2).sum())
+        return 5 - depth, 2 * uv * depth, 5 - depth
+
+
+def test_steps_down_a_slope_that_grows_are_not_remembered(monkeypatch):
+    """A quadratic would have its top there, and not its bottom ahead."""
+    remembered = []
+
+    def spy(slope, pairs):
+        remembered.append(len(pairs))
+        return direction(slope, pairs)
+
+    monkeypatch.setattr("baselines.disks.smith_schaefer.direction", spy)
+    *_, (bottom, end) = descent(Pit(1.0), np.array([[2.2, 0.0]]), 50)
+    assert remembered[:3] == [0, 0, 1]  # from 2.2 to 1.2, to 0.2
+    assert_allclose(bottom, 0, atol=1e-3)
+    assert end == pytest.approx(4, abs=1e-5)
+
+
 def test_where_the_remembered_steps_mislead_the_slope_leads_on(monkeypatch):
     monkeypatch.setattr(
         "baselines.disks.smith_schaefer.direction",
@@ -187,3 +221,9 @@ def test_where_the_remembered_steps_mislead_the_slope_leads_on(monkeypatch):
     *_, (bottom, end) = descent(Bowl(1.0), np.array([[0.3, -0.4], [0.2, 0.1]]), 50)
     assert end == pytest.approx(4, abs=1e-5)
     assert_allclose(bottom, 0, atol=1e-2)
+
+
+def test_a_start_with_flips_is_refused(monkeypatch):
+    monkeypatch.setattr("baselines.disks.smith_schaefer.tutte", lambda disk: tutte(disk) * [1, -1])
+    with pytest.raises(FlatteningError, match="the start, has flipped triangles"):
+        SmithSchaefer().parameterize(irregular_disk(), seed=0)
