@@ -40,6 +40,7 @@ def test_a_developable_cloud_is_unrolled(spec):
     result = mapped(spec, cloud)
     assert result.report["normals"] == "estimated"
     assert result.report["mean_distance_to_mesh"] < 0.01
+    assert result.report["charts"] >= result.report["components"] >= 1
     # Distances between points near to each other, up to the scale of the map.
     inner = np.flatnonzero((flat > 0.2).all(axis=1) & (flat < [np.pi - 0.2, 1.8]).all(axis=1))
     pairs = np.random.default_rng(0).choice(inner, (4000, 2))

@@ -144,6 +144,15 @@ def test_seams_in_sight_cost_more():
     assert not lid[edges].all(axis=1).any()
 
 
+def test_the_seam_of_a_cube_of_which_the_lid_alone_is_seen_stays_off_the_lid(monkeypatch):
+    mesh = cube(4)
+    lid = mesh.vertices[:, 2] == 1
+    monkeypatch.setattr(seamster, "visibility", lambda _: lid.astype(float))
+    seams = Seamster().parameterize(mesh, seed=0).seams(mesh)
+    assert len(seams) == 7 * 4
+    assert not lid[seams].all(axis=1).any()
+
+
 def test_a_curvature_of_nothing_is_refused():
     with pytest.raises(InputError, match="curvature must be a number above 0"):
         Seamster(curvature=0.0)
@@ -153,7 +162,8 @@ def test_only_the_most_curved_terminals_are_taken_where_there_are_many(monkeypat
     mesh = cube()
     near = np.linalg.norm(mesh.vertices - 1, axis=1)
     pulled = mesh.vertices + np.exp(-((near / 0.25) ** 2))[:, None]
-    monkeypatch.setattr(seamster, "MOST_TERMINALS", 3)
-    found = pointed(Mesh(pulled, mesh.faces), 1.5)
-    assert len(found) == 3
-    assert mesh.vertices[found[0]].tolist() == [1, 1, 1]
+    for count in (1, 3):
+        monkeypatch.setattr(seamster, "MOST_TERMINALS", count)
+        found = pointed(Mesh(pulled, mesh.faces), 1.5)
+        assert len(found) == count
+        assert mesh.vertices[found[0]].tolist() == [1, 1, 1]
