@@ -238,8 +238,9 @@ def test_uvatlas_options_reach_the_library():
     assert np.ptp(close.uv, axis=0).max() <= 128
     used = [np.abs(signed_areas(made.uv, made.corners)).sum() for made in (close, apart)]
     assert used[1] < 0.8 * used[0]
-    with pytest.raises(InputError, match="max_stretch must lie between 0 and 1"):
-        registry.method("uvatlas(max_stretch=3)")
+    for stretch in (1.1, -0.1):
+        with pytest.raises(InputError, match="max_stretch must lie between 0 and 1"):
+            registry.method(f"uvatlas(max_stretch={stretch})")
 
 
 def test_missing_package_says_what_to_install():
