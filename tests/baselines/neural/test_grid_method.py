@@ -34,6 +34,7 @@ def test_a_method_is_given_the_points_in_a_ball_of_radius_1_and_some_to_learn_fr
     ((points, drawn, side, seed),) = given
     np.testing.assert_allclose(points, (np.concatenate([corners, inside]) - 1) / np.sqrt(3))
     assert drawn.shape == (120, 3)
+    assert len(set(map(tuple, drawn))) == 120
     assert set(map(tuple, drawn)) < set(map(tuple, points))
     assert (side, seed) == (13, 4)
     np.testing.assert_allclose(result.uv, 5 * np.sqrt(3) * centres(13)[:150])
