@@ -135,3 +135,4 @@ def test_each_part_lies_in_its_most_probable_chart_as_large_as_its_share(monkeyp
     result = Nuvo(charts=2, points=400, subset=150, iterations=1).parameterize(surface, seed=0)
     assert_each_part_is_in_its_square(result, surface, shares)
     assert result.report["charts"] == 2
+    assert result.report["points_of_a_step"] == 128  # at most
