@@ -124,6 +124,20 @@ def test_faces_are_added_and_left_out_where_the_region_stays_a_disk():
     assert_disk(mesh, region.faces())
 
 
+def test_a_face_may_leave_where_it_bares_no_vertex_of_the_border():
+    turn = np.arange(6) * np.pi / 3
+    rim = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    spokes = [[6, k, (k + 1) % 6] for k in range(6)]
+    fan = Region(Mesh(np.vstack([rim, [[0, 0, 0]]]), spokes), 0, range(6))
+    assert [fan.may_leave(face) for face in range(6)] == [False] + 5 * [True]  # 0 is the seed
+    fan.drop(3)
+    assert [fan.may_leave(face) for face in range(6)] == [False, False, True, False, True, False]
+    zigzag = np.array([[k, k % 2, 0.0] for k in range(6)])
+    strip = [[0, 2, 1], [1, 2, 3], [2, 4, 3], [3, 4, 5]]
+    region = Region(Mesh(zigzag, strip), 0, range(4))
+    assert [region.may_leave(face) for face in range(4)] == [False, False, False, True]
+
+
 def test_smoothing_leaves_out_what_sticks_out():
     mesh = cube()
     region = Region(mesh, 0)
@@ -171,3 +185,21 @@ def test_a_seed_that_is_no_face_or_has_no_area_is_refused():
         DAWand(triangle=176).parameterize(flat, seed=0)
     with pytest.raises(Exception, match="needs faces"):
         DAWand().parameterize(PointCloud(mesh.vertices), seed=0)
+
+
+@pytest.mark.parametrize(("degrees", "offset"), [(75, 0.1), (210, -0.3)])
+def test_smoothing_leaves_faces_where_they_are_with_as_many_inside_as_outside(degrees, offset):
+    """On an even border, here along a line across a square, some have just half around them."""
+    mesh = irregular_disk()
+    across = np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees)), 0])
+    below = np.flatnonzero(mesh.vertices[mesh.faces].mean(axis=1) @ across < offset).tolist()
+    region = Region(mesh, below[len(below) // 2])
+    for _ in range(20):
+        for face in below:
+            if region.fits(face):
+                region.add(face)
+    before = region.faces().tolist()
+    votes = (region.uses / region.valence)[mesh.faces].mean(axis=1)
+    assert (votes == 0.5).any()
+    region.smooth()
+    assert region.faces().tolist() == before

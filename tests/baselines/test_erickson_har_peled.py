@@ -126,3 +126,26 @@ def test_the_map_is_one_to_one_and_its_seam_is_the_cut():
     ends = mesh.vertices[result.seams(mesh)]
     seam = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum()
     assert seam == pytest.approx(result.report["cut_length"])
+
+
+def test_a_ring_is_cut_once_from_one_hole_to_the_other():
+    """A cylinder without lids, of eight sides and three rows: three edges of length 1."""
+    angle = np.arange(8) * np.pi / 4
+    rings = [np.stack([np.cos(angle), np.sin(angle), np.full(8, z)], axis=1) for z in range(4)]
+    at = np.arange(32).reshape(4, 8)
+    p, q = at[:-1], np.roll(at[:-1], -1, axis=1)
+    quads = [of.ravel() for of in (p, q, q + 8, p + 8)]
+    faces = [np.stack([quads[k] for k in side], axis=1) for side in ([0, 1, 2], [0, 2, 3])]
+    ring = Mesh(np.concatenate(rings), np.concatenate(faces))
+    cut, cycles = opened(ring)
+    assert (cycles, cut.topology) == ([], "disk")
+    assert added(ring, cut) == pytest.approx(3)
+
+
+def test_along_a_hole_a_cycle_costs_nothing():
+    """A torus that is slit open along 20 of the 24 edges of its inner ring."""
+    at = 10 * np.arange(20) + 5
+    slit = without(torus(), *at, *(at + 240))
+    assert slit.genus == 1
+    _, length = shortest_cycle(slit)
+    assert length == pytest.approx(4 * 2 * (3 - 1) * np.sin(np.pi / 24), rel=1e-6)

@@ -3,6 +3,7 @@ import subprocess
 import sys
 import textwrap
 import tomllib
+import types
 import zipfile
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
@@ -236,6 +237,24 @@ def test_what_a_method_imports_is_known_through_modules_of_the_project(name, imp
     assert {name for name in ("torch", "pymeshlab") if registry.imports(method, name)} == imported
 
 
+@pytest.mark.parametrize("home", ["baselines.own", "plugin.own"])
+def test_imports_are_followed_through_modules_of_the_project_and_no_farther(monkeypatch, home):
+    """A method's module, one that a name of it comes from, and what both import."""
+    names = (home, "parapoint.other", "foreign", "near", "far")
+    modules = {name: types.ModuleType(name) for name in names}
+    for name, module in modules.items():
+        monkeypatch.setitem(sys.modules, name, module)
+    own = modules[home]
+    own.gone = type("Gone", (), {"__module__": "parapoint.gone"})
+    own.again = own.thing = type("Thing", (), {"__module__": "parapoint.other"})
+    own.foreign = modules["foreign"]
+    modules["parapoint.other"].near = modules["near"]
+    modules["foreign"].far = modules["far"]
+    method = type("Method", (), {"__module__": home})
+    found = [name for name in ("foreign", "near", "far") if registry.imports(method, name)]
+    assert found == ["foreign", "near"]
+
+
 @pytest.mark.usefixtures("_no_plugins")
 @pytest.mark.parametrize(
     ("text", "fault"),
@@ -250,6 +269,13 @@ def test_what_a_method_imports_is_known_through_modules_of_the_project(name, imp
             "requires in .* must be a frozenset of",
         ),
         ("other = 1", "there is no class Thing"),
+        *(
+            (
+                EXAMPLE.replace("Planar", "Thing") + f"    environment = {needed}\n",
+                "environment in .* must be a tuple of requirements",
+            )
+            for needed in ("'bpy'", "(3,)", "('',)")
+        ),
     ],
 )
 def test_bad_plugins_are_refused(tmp_path, text, fault):
@@ -288,6 +314,8 @@ def test_fields_that_are_no_arguments_are_left_out(monkeypatch):
     assert registry.method("sized(sizes=[3])")[1].sizes == (3,)
 
 
+SHEET = {"points": 10_000, "iterations": 4_000, "subset": 1_024, "time_budget": None}
+GRID = {"points": 10_000, "iterations": 8_000, "subset": 576, "time_budget": None}
 PARAMETERS = {
     "abf": {"iterations": 30},
     "geometry_image": {"side": 257},
@@ -347,7 +375,18 @@ PARAMETERS = {
         "max_distortion": None,
         "distortion": "isometric",
     },
+    "seamster": {"curvature": 1.5},
+    "da_wand": {"triangle": 0, "distortion": 0.01},
     "fam": {"points": 10_000, "iterations": 10_000, "subset": 10_000, "time_budget": None},
+    "foldingnet": SHEET,
+    "atlasnet": SHEET | {"charts": 4},
+    "diffsr": SHEET | {"charts": 4},
+    "elestruc": SHEET | {"charts": 4, "dimension": 3},
+    "gtif": SHEET,
+    "tearingnet": SHEET,
+    "flattening_net": GRID | {"subset": 256},
+    "reggeonet": GRID,
+    "nsm": {"points": 100_000, "iterations": 20_000, "subset": 256, "time_budget": None},
     "nuvo": {
         "points": 10_000,
         "iterations": 10_000,
@@ -364,6 +403,12 @@ own. A default that changes here makes new results that cannot be told from old 
 def test_defaults_stay_what_the_results_were_measured_under(name):
     wanted = {key: repr(value) for key, value in PARAMETERS[name].items()}
     assert registry.describe(name).parameters == wanted
+
+
+def test_the_defaults_of_every_method_are_held():
+    """Those of ParaPoint are its presets', which its own tests hold."""
+    known = {name for name in registry.METHODS if registry.describe(name).parameters}
+    assert known - PARAMETERS.keys() == {"parapoint"}
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from baselines import seamster
 from baselines.hybrid import AutomaticSLIM
 from baselines.seamster import HIDDEN, Seamster, joining_tree, pointed
 from baselines.visibility import visibility
@@ -68,6 +69,12 @@ def test_a_convex_surface_is_seen_from_half_of_all_sides_and_a_cavity_from_fewer
     assert seen[dent].mean() < 0.5 * visibility(mesh)[dent].mean()
 
 
+@pytest.mark.parametrize("turn", [1, -1])
+def test_a_triangle_is_seen_from_half_of_all_sides_whichever_way_it_faces(turn):
+    triangle = Mesh([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2][::turn]])
+    assert visibility(triangle).tolist() == [0.5] * 3
+
+
 def test_the_tree_of_a_cube_has_seven_of_its_edges():
     mesh = cube()
     terminals = pointed(mesh, 1.5)
@@ -88,10 +95,31 @@ def test_the_tree_goes_where_it_costs_least_and_ends_at_the_boundary():
     assert np.isin(edges, rim).sum() == 1
 
 
+def test_along_the_boundary_no_seam_is_needed():
+    """Between opposite sides the way through the middle is shorter, but to be cut."""
+    mesh = irregular_disk()
+    assert not len(joining_tree(mesh, np.ones(len(mesh.edges)), np.array([4, 76])))
+
+
+def test_a_flat_disk_is_not_cut():
+    flat = irregular_disk()
+    flat = Mesh(flat.vertices * [1, 1, 0], flat.faces)
+    report = Seamster().parameterize(flat, seed=0).report
+    assert [report[of] for of in ("terminals", "tree_length", "seen")] == [0, 0, 0]
+
+
+def test_a_tip_amid_the_boundary_is_a_terminal():
+    rim = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]]
+    faces = [[4, 0, 1], [4, 1, 2], [4, 2, 3], [4, 3, 0]]
+    assert pointed(Mesh([*rim, [0, 0, 2]], faces), 1.5).tolist() == [4]
+
+
 def test_a_seam_to_the_corners_makes_a_better_map_of_a_cube_than_the_automatic_one():
     mesh = cube()
     result = Seamster().parameterize(mesh, seed=0)
     assert result.report["terminals"] == 8
+    assert result.report["tree_length"] == pytest.approx(7)
+    assert 0.4 < result.report["seen"] < 0.5  # its edges are in sight from half of all sides
     assert result.report["end_energy"] < 4 + 1e-3  # a cube unfolds
     automatic = AutomaticSLIM(price=None)
     (disk,) = prepared(mesh, automatic.requires).parts
@@ -116,6 +144,26 @@ def test_seams_in_sight_cost_more():
     assert not lid[edges].all(axis=1).any()
 
 
+def test_the_seam_of_a_cube_of_which_the_lid_alone_is_seen_stays_off_the_lid(monkeypatch):
+    mesh = cube(4)
+    lid = mesh.vertices[:, 2] == 1
+    monkeypatch.setattr(seamster, "visibility", lambda _: lid.astype(float))
+    seams = Seamster().parameterize(mesh, seed=0).seams(mesh)
+    assert len(seams) == 7 * 4
+    assert not lid[seams].all(axis=1).any()
+
+
 def test_a_curvature_of_nothing_is_refused():
     with pytest.raises(InputError, match="curvature must be a number above 0"):
         Seamster(curvature=0.0)
+
+
+def test_only_the_most_curved_terminals_are_taken_where_there_are_many(monkeypatch):
+    mesh = cube()
+    near = np.linalg.norm(mesh.vertices - 1, axis=1)
+    pulled = mesh.vertices + np.exp(-((near / 0.25) ** 2))[:, None]
+    for count in (1, 3):
+        monkeypatch.setattr(seamster, "MOST_TERMINALS", count)
+        found = pointed(Mesh(pulled, mesh.faces), 1.5)
+        assert len(found) == count
+        assert mesh.vertices[found[0]].tolist() == [1, 1, 1]

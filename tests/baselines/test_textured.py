@@ -1,12 +1,15 @@
+import time
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial import cKDTree
 
-from baselines.textured import Textured, looked_up, nearest_baked, seen_points
+from baselines.textured import Textured, _places, looked_up, nearest_baked, seen_points
+from baselines.tools.optional import Missing
 from benchmarks.cases.coloured import coloured, wave_colours
 from parapoint import Mesh, Parameterization, PointCloud
-from parapoint.method import UnsupportedError
+from parapoint.method import MissingError, UnsupportedError
 from parapoint.surfaces.parameterization import Charted
 
 FACES = np.array([[0, 1, 2], [0, 2, 3]])
@@ -58,12 +61,25 @@ def colours_at(points) -> np.ndarray:
     return np.rint(255 * wave_colours(points, 5.0)).astype(np.uint8)
 
 
-def test_a_cloud_without_colours_shows_its_coordinates_and_a_mesh_is_skipped() -> None:
+def test_a_cloud_without_colours_shows_its_coordinates_and_a_mesh_is_skipped(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("baselines.meshed.pymeshlab", Missing("needs MeshLab"))  # not for ours
     points = np.column_stack([RNG.random((400, 2)), np.zeros(400)])
     report = Textured(texels=64).parameterize(PointCloud(points), seed=0).report
     assert report["bake_psnr"] > 35
+    with pytest.raises(MissingError, match="needs MeshLab"):
+        Textured(pipeline="poisson").parameterize(PointCloud(points), seed=0)
     with pytest.raises(UnsupportedError, match="is a mesh"):
         Textured().parameterize(PLATE.mesh, seed=0)
+
+
+def test_the_way_of_today_reads_back_colours_that_stand_a_spacing_away() -> None:
+    """Of as many points ours makes 34 dB."""
+    pytest.importorskip("pymeshlab")
+    cloud = coloured(PLATE.mesh, 2.0, 400)
+    report = Textured(pipeline="ball_pivoting", texels=64).parameterize(cloud, seed=0).report
+    assert 20 < report["bake_psnr"] < 30
 
 
 def test_points_held_out_lie_among_the_others() -> None:
@@ -72,3 +88,23 @@ def test_points_held_out_lie_among_the_others() -> None:
     assert is_seen.mean() == pytest.approx(0.8, abs=0.03)
     near = cKDTree(cloud.points[is_seen]).query(cloud.points[~is_seen])[0]
     assert np.median(near) < 0.75 / np.sqrt(is_seen.sum())  # of a random draw 0.47
+
+
+def test_a_cloud_of_one_colour_is_read_back_as_well_as_is_told() -> None:
+    points = np.column_stack([RNG.random((400, 2)), np.zeros(400)])
+    colours = np.full((400, 4), 200, dtype=np.uint8)  # the fourth is opacity
+    begun = time.process_time()
+    report = (
+        Textured(texels=64)
+        .parameterize(PointCloud(points, attributes={"colours": colours}), seed=0)
+        .report
+    )
+    assert report["bake_psnr"] == pytest.approx(100)
+    assert 0 < report["bake_cpu_seconds"] < time.process_time() - begun
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1e3])
+def test_coordinates_as_colours_fill_the_longest_side_of_the_box(unit: float) -> None:
+    points = unit * np.array([[5.0, 7, 9], [7, 8, 9], [5, 7, 9.5]])
+    assert_allclose(_places(points), [[0, 0, 0], [1, 0.5, 0], [0, 0, 0.25]], atol=1e-9)
+    assert not _places(points[:1]).any()

@@ -123,3 +123,14 @@ def test_one_triangle_keeps_its_angles():
         np.sort(igl.internal_angles(uv, mesh.faces)),
         np.sort(igl.internal_angles(mesh.vertices, mesh.faces)),
     )
+
+
+def test_needles_aim_at_angles_that_have_a_tangent():
+    """Of a needle's angles two are almost 0 or pi; a thousandth from both ends is the limit."""
+    mesh = irregular_disk()
+    needles = Mesh(mesh.vertices * [1e5, 1, 1], mesh.faces)
+    sharp = igl.internal_angles(needles.vertices, needles.faces)
+    assert sharp.min() < 1e-4 < np.pi - 1e-4 < sharp.max()
+    target = angles(needles.vertices, needles.faces).target
+    assert target.min() == pytest.approx(1e-3)
+    assert target.max() == pytest.approx(np.pi - 1e-3)

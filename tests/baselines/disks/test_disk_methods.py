@@ -239,7 +239,8 @@ def test_slim_energies_by_hand_and_their_fall():
     # exp(1e6 / 2) would overflow; the triangle's share of a quarter is left.
     far = map_energy("exp_conformal", weight, np.array([1e3, 1]), np.array([1e-3, 1]))
     assert far == pytest.approx(5e5 + 5e-7 + np.log(0.25))
-    assert map_energy("conformal", weight, s1, np.array([1, -1])) == np.inf
+    for flat in (0.0, -0.1):
+        assert map_energy("conformal", weight, s1, np.array([1, flat])) == np.inf
 
 
 @pytest.mark.parametrize(
@@ -431,6 +432,8 @@ def test_a_start_whose_energy_has_no_number_is_no_minimum():
     flipped = tutte(disk) * [1, -1]
     for name in DENSITIES:
         assert not is_minimum(name, weight, frame, flipped, disk.faces)
+        # Nor is one so narrow that the exponential of its energy is beyond all numbers.
+        assert not is_minimum(name, weight, frame, tutte(disk) * [1, 1e-3], disk.faces)
     # Where nothing pulls, as on a triangle mapped to itself, the slope is 0 and it is one.
     one = domain(Mesh([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
     assert is_minimum("conformal", np.ones(1), frames(one), one.vertices[:, :2], one.faces)
@@ -444,3 +447,29 @@ def test_lscm_lays_its_far_vertices_on_the_first_axis_from_the_origin():
     assert_allclose(first, 0, atol=1e-9)
     assert second[1] == pytest.approx(0, abs=1e-9)
     assert second[0] > 1
+
+
+@pytest.mark.parametrize(
+    ("spec", "embedding"),
+    [("tutte", "tutte.tutte"), ("mean_value", "mean_value.embedded")],
+)
+def test_flips_and_triangles_without_area_are_counted_apart(monkeypatch, spec, embedding):
+    """A fan whose first triangle is drawn on a line; in the mirror the others are turned over."""
+    angle = np.radians([0, 60, 120, 180, 240])
+    rim = np.stack([np.cos(angle), np.sin(angle), np.zeros(5)], axis=1)
+    faces = np.stack([np.full(5, 5), np.arange(5), (np.arange(5) + 1) % 5], axis=1)
+    mesh = Mesh(np.vstack([rim, [[0, 0, 0.5]]]), faces)
+    flat = np.array([[1, 0], [2, 0], [0, 1], [-1, 0], [0, -1], [0, 0.0]])
+    monkeypatch.setattr(f"baselines.disks.{embedding}", lambda *_: flat)
+    assert mapped(spec, mesh).report == {"flipped": 0, "degenerate": 1}
+    flat = flat * [1, -1]
+    assert mapped(spec, mesh).report == {"flipped": 4, "degenerate": 1}
+
+
+def test_the_cotangents_of_a_harmonic_map_balance_inside_and_at_holes():
+    mesh = sample_surfaces()["a disk with a hole"]
+    disk = domain(mesh)
+    uv = mapped("harmonic", mesh).uv
+    pull = igl.cotmatrix(disk.vertices, disk.faces) @ uv
+    assert_allclose(np.delete(pull, disk.loop, axis=0), 0, atol=1e-10)
+    assert_allclose(np.linalg.norm(uv[disk.loop], axis=1), np.linalg.norm(uv[disk.loop[0]]))

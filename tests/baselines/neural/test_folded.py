@@ -58,6 +58,10 @@ def test_numbers_of_charts_out_of_range_are_refused(kind):
         kind(charts=0)
 
 
+def test_two_dimensions_will_do_and_so_will_ten():
+    assert [EleStruc(dimension=of).dimension for of in (2, 10)] == [2, 10]
+
+
 @pytest.mark.parametrize("dimension", [1, 11])
 def test_dimensions_out_of_range_are_refused(dimension):
     with pytest.raises(InputError, match="dimension must be a whole number"):
@@ -102,8 +106,14 @@ def test_squares_that_are_larger_than_the_surface_together_cost_as_much_as_they_
     axes = torch.eye(3)[:2]
     networks.sheets = torch.nn.ModuleList([Linear(axes), Linear(axes)])
     points = flat(1000)
-    cost = networks.terms(points, 400, generator())["overlap"].item()
+    terms = networks.terms(points, 400, generator())
+    assert terms["chamfer"].item() < 0.01  # the sheets lie on the points
+    cost = terms["overlap"].item()
     assert cost == pytest.approx(1e-2 * (2 * 4 - surface_area(points).item()) ** 2, rel=1e-4)
+    uneven = torch.tensor([[2.0], [0.5]]) * axes
+    networks.sheets = torch.nn.ModuleList([Linear(uneven), Linear(axes)])
+    cost = networks.terms(points, 400, generator())["deformation"].item()
+    assert cost == pytest.approx(1e-3 * 3.75**2 / 2)
     networks.sheets = torch.nn.ModuleList([Linear(0.5 * axes), Linear(0.5 * axes)])
     assert networks.terms(points, 400, generator())["overlap"].item() == 0
 
@@ -149,6 +159,20 @@ def test_the_graph_joins_neighbours_in_the_grid_alone_by_weights_that_sum_to_one
     moved[SIDE * 7 + 7] += 100.0  # where it is far from all, none of them joins it
     away = grid.is_near & (grid.near == SIDE * 7 + 7)
     assert sheet.adjacency(moved)[away].max() < 1e-3 < weights[away].min()
+
+
+def test_the_filter_is_a_polynomial_of_the_graph_whose_shares_sum_to_one():
+    sheet = FilteredGrid(generator(), 5)
+    grid = sheet.grid
+    with torch.no_grad():
+        folded = sheet.fold(grid.places[None])[0]
+        graph = torch.zeros(25, 25)
+        graph.scatter_add_(1, grid.near, sheet.adjacency(folded))
+        powers = torch.stack([folded, graph @ folded, graph @ graph @ folded])
+        torch.testing.assert_close(sheet.nodes()[0], powers.mean(dim=0))  # as it starts
+        sheet.filter.copy_(torch.tensor([0.5, 0.2]))
+        wanted = (torch.tensor([0.3, 0.5, 0.2])[:, None, None] * powers).sum(dim=0)
+        torch.testing.assert_close(sheet.nodes()[0], wanted)
 
 
 def test_filtering_brings_the_folded_grid_nearer_to_the_surface():
@@ -207,7 +231,22 @@ def test_a_cell_whose_edges_are_pulled_apart_tears_and_has_no_preimages():
     assert found[1, 0] >= half - 1e-6
     assert distance[:2].min() > 0.2
     np.testing.assert_allclose(found[2], [-0.5, 0.1], atol=1e-4)
-    assert (sheet(torch.zeros(1, 1, 2))[0] == FAR).all()
+    place, *tangents = sheet(with_axes(torch.zeros(1, 2)))
+    assert (place == FAR).all()
+    assert not torch.stack(tangents).any()  # no way leads out of it
+
+
+@pytest.mark.parametrize(("medians", "is_torn"), [(1.9, False), (2.1, True)])
+def test_an_edge_tears_where_it_is_longer_than_two_medians(medians, is_torn):
+    width = (medians - 1) * 2 / SIDE
+    assert torn_grid(width).nodes()[1].all() != is_torn
+
+
+def test_edges_of_median_length_weigh_as_much_as_a_standard_deviation():
+    sheet = torn_grid(0.0)
+    weights = sheet.weights(3 * sheet.grid.places)
+    is_near = sheet.grid.is_near
+    torch.testing.assert_close(weights, torch.exp(torch.tensor(-0.5)) * is_near, rtol=1e-3, atol=0)
 
 
 def test_without_tears_the_sheet_bridges_the_gap():
@@ -240,9 +279,10 @@ def test_the_filter_smooths_along_kept_edges_alone():
     inside = sheet.grid.is_near.all(dim=1)
     beside = sheet.grid.places[:, 0].abs() < 0.1
     torch.testing.assert_close(after[inside & ~beside], before[inside & ~beside])
-    gap = after[beside][:, 0]
-    assert gap.min() < before[beside][:, 0].min()  # away from the tear, to the neighbours left
-    assert gap.max() > before[beside][:, 0].max()
+    gap = (after - before)[inside & beside]
+    # Away from the tear, by 0.3 of the way to the mean of the three neighbours left.
+    away = 0.3 * 2 / SIDE / 3 * sheet.grid.places[inside & beside][:, 0].sign()
+    torch.testing.assert_close(gap, torch.nn.functional.pad(away[:, None], (0, 2)))
 
 
 def test_edges_lead_one_step_along_the_axes():

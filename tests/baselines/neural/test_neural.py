@@ -1,6 +1,7 @@
 """The neural rivals: their networks' derivatives, their terms, what they make of a surface."""
 
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import torch
 
 from baselines.neural.fam import FAM
 from baselines.neural.fam_training import FAMTrainer, repulsion
-from baselines.neural.method import surface_normals
+from baselines.neural.method import NeuralMethod, surface_normals
 from baselines.neural.nuvo import Nuvo
 from baselines.neural.nuvo_training import NuvoNetworks, NuvoTrainer, encoded
 from parapoint import PointCloud
@@ -101,6 +102,7 @@ def test_the_loss_falls_and_the_report_says_what_ran(method, kind):
     totals = [row.values["total"] for row in result.trace]
     assert totals[-1] < 0.8 * totals[0]
     assert result.report["iterations"] == 12
+    assert result.report["losses"] == result.trace[-1].values
     assert result.report["weights"] == kind.weights
     assert sum(row.uv is not None for row in result.trace) == 8
     assert np.array_equal(result.trace[-1].uv.shape, result.uv.shape)
@@ -148,6 +150,38 @@ def test_the_map_is_in_the_unit_of_the_surface(method):
         for unit in (1.0, 1024.0)
     ]
     np.testing.assert_allclose(maps[1], 1024 * maps[0], rtol=1e-5, atol=1e-2)
+
+
+class Known:
+    """In the place of a trainer: its map leaves the third coordinate out."""
+
+    device, weights, divergences, iteration = "cpu", {}, 0, 1
+    networks = SimpleNamespace(parameterization=lambda points: points[:, :2])
+
+    def __init__(self, points, normals, preset, **_):
+        type(self).given = points, normals
+        self.subset = preset.subset
+
+    def run(self):
+        yield SimpleNamespace(iteration=1, seconds=0.0, losses={"total": 1.0}, progress=1.0)
+
+
+@pytest.mark.parametrize("kind", [Mesh, PointCloud])
+def test_the_networks_know_the_surface_in_a_ball_of_radius_1_around_the_origin(kind):
+    """Of a cube somewhere, with a side of 10."""
+    corners = np.array([[x, y, z] for x in (0, 10) for y in (0, 10) for z in (0, 10)])
+    inside = np.random.default_rng(0).uniform(4, 10, (142, 3))
+    points = np.array([7.0, 8, 9]) + np.vstack([corners, inside])
+    faces = np.arange(150).reshape(50, 3)
+    surface = PointCloud(points) if kind is PointCloud else Mesh(points, faces)
+    method = type("Held", (NeuralMethod,), {"trainer": lambda _: Known})(points=150, subset=120)
+    result = method.parameterize(surface, seed=0)
+    given, normals = Known.given
+    np.testing.assert_allclose(given.min(axis=0), -(3**-0.5))
+    np.testing.assert_allclose(given.max(axis=0), 3**-0.5)
+    np.testing.assert_allclose(result.uv, points[:, :2] - [12, 13], atol=1e-4)
+    assert (normals is None) == (kind is PointCloud)
+    assert (result.report["points"], result.report["points_of_a_step"]) == (150, 120)
 
 
 def test_only_a_run_without_a_time_limit_is_the_same_each_time():

@@ -1,21 +1,25 @@
 """Neural Surface Maps: samples, losses by hand, and what the refinement changes."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import torch
 
 from baselines.hybrid import AutomaticSLIM
-from baselines.neural.nsm import NSM
+from baselines.neural.nsm import NSM, flattened
 from baselines.neural.nsm_networks import Refinement, SurfaceMap, with_axes
 from baselines.neural.nsm_samples import Triangles
 from baselines.neural.nsm_training import (
     ROUND,
     batches,
     distortion_terms,
+    figures,
     first_forms,
     overfit_terms,
 )
 from baselines.neural.stepping import trained
+from parapoint import clock
 from parapoint.errors import InputError
 from parapoint.surfaces.surface import PointCloud
 from parapoint.testing import irregular_disk
@@ -68,6 +72,26 @@ def test_the_distortion_by_hand():
     assert mirrored["flip"].item() == pytest.approx(100 * 2)
 
 
+def test_the_figures_of_a_map_that_is_a_tenth_too_large_and_of_a_mirror():
+    at = Triangles(FLAT, FLAT @ A.T).drawn(500, generator())
+    found = figures(lambda x: 1.1 * plane(x), lambda x: x * torch.tensor([1.0, -1.0]), at)
+    form = 1.1**2 * A.T @ A
+    safe = form + 0.01 * torch.eye(2)
+    energy = form.trace().item() + torch.linalg.inv(safe).trace().item()
+    assert found == pytest.approx(
+        {
+            "distance": 0.1 * at.points.square().sum(1).mean().sqrt().item(),
+            "derivative_error": 0.1,
+            "derivative_error_rms": 0.1,
+            "distortion_before": energy,
+            "distortion_after": energy,
+            "flipped": 1,
+        },
+        rel=1e-3,
+    )
+    assert figures(plane, Refinement(generator()), at)["flipped"] == 0
+
+
 def test_the_first_form_is_that_of_differences():
     surface = SurfaceMap(generator()).double()
     uv = torch.rand(5, 2, dtype=torch.float64, generator=generator())
@@ -118,6 +142,23 @@ def test_time_ends_it_and_the_steps_say_how_far_it_came():
     assert 0 < refinement < 8_500
     assert not NSM(time_budget=0.5).deterministic
     assert NSM().deterministic
+
+
+def test_half_of_the_time_is_the_flattening_s(monkeypatch):
+    monkeypatch.setattr(clock, "worked", lambda: 100.0)
+    assert flattened(irregular_disk(), 10.0).deadline == 105
+
+
+def test_the_surface_map_has_four_residual_blocks_and_the_refinement_is_smaller():
+    def layers(*sizes):
+        return sum((a + 1) * b for a, b in pairwise(sizes))
+
+    def count(network):
+        return sum(of.numel() for of in network.parameters())
+
+    surface = SurfaceMap(generator())
+    assert count(surface) == layers(2, 128) + 4 * layers(128, 128, 128) + layers(128, 3)
+    assert count(Refinement(generator())) == layers(2, 64, 64, 2)
 
 
 def test_a_cloud_and_a_bad_budget_are_refused():

@@ -5,8 +5,8 @@ import pytest
 import torch
 
 from baselines.neural.nuvo import Nuvo
-from baselines.neural.nuvo_charts_training import ChartNetworks, chart_terms
-from baselines.neural.nuvo_training import NuvoTrainer
+from baselines.neural.nuvo_charts_training import WEIGHTS, ChartNetworks, chart_terms
+from baselines.neural.nuvo_training import NuvoNetworks, NuvoTrainer
 from baselines.neural.stepping import trained
 from parapoint.errors import InputError
 from parapoint.surfaces.normals import tangent_frames
@@ -148,7 +148,8 @@ def test_two_squares_become_two_charts():
 def test_charts_are_packed_apart_and_shared_by_faces(surface):
     result = Nuvo(charts=3, iterations=5, **SMALL).parameterize(surface, seed=0)
     assert result.report["charts"] <= 3
-    assert len(result.trace) == 5
+    assert [row.iteration for row in result.trace] == [1, 2, 3, 4, 5]
+    assert result.report["losses"] == result.trace[-1].values
     assert np.isfinite(result.uv).all()
 
 
@@ -163,6 +164,48 @@ def test_a_single_chart_is_as_it_was():
         for of in ({}, {"charts": 1})
     ]
     np.testing.assert_array_equal(*uv)
+
+
+@pytest.mark.parametrize(
+    "stack",
+    [
+        NuvoNetworks(generator()).texture_stack,
+        NuvoNetworks(generator()).surface_stack,
+        ChartNetworks(2, generator()).chooser,
+        ChartNetworks(2, generator()).surfaces[1],
+    ],
+)
+def test_between_its_layers_a_network_cuts_what_is_negative(stack):
+    x = torch.randn(20, len(stack.layers[0]) - 1, generator=generator())
+    with torch.no_grad():
+        found = stack(x[None])[0]
+        for number, layer in enumerate(stack.layers):
+            x = torch.nn.functional.pad(x.clamp(min=0) if number else x, (0, 1), value=1.0) @ layer
+    torch.testing.assert_close(found, x)
+
+
+def test_several_charts_weigh_the_terms_as_one_does():
+    assert NuvoTrainer.weights | {"entropy": 0.05, "cluster": 0.1} == WEIGHTS
+
+
+def test_the_terms_are_weighed_and_their_sum_falls(monkeypatch):
+    small = {"charts": 2, "points": 120, "subset": 50}
+    totals = [
+        row.values["total"]
+        for row in Nuvo(**small, iterations=8).parameterize(irregular_disk(), seed=0).trace
+    ]
+    assert totals[-1] < 0.7 * totals[0]
+    monkeypatch.setattr(
+        "baselines.neural.nuvo_charts.chart_terms",
+        lambda networks, *_: dict.fromkeys(WEIGHTS, 2 * networks.sigma.mean()),  # each is 2
+    )
+    (row,) = Nuvo(**small, iterations=1).parameterize(irregular_disk(), seed=0).trace
+    weighed = {name: 2 * weight for name, weight in WEIGHTS.items()}
+    assert row.values == pytest.approx(weighed | {"total": sum(weighed.values())})
+
+
+def test_sixteen_charts_will_do():
+    assert Nuvo(charts=16).charts == 16
 
 
 @pytest.mark.parametrize("charts", [0, 17])

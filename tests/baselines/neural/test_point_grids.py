@@ -73,6 +73,19 @@ def test_points_that_lie_where_cells_are_go_there_whatever_the_blocks(count):
         assert (cell == order).all()
 
 
+def test_points_are_shared_out_at_the_least_sum_of_squared_distances():
+    """Both points are nearer to the first of two cells; the other one gains more of it.
+
+    0 + (0.94² + 0.9²) = 1.69 for the points in their order, (0.06² + 0.9²) + 1 = 1.81 otherwise.
+    """
+    points, places = np.array([[0, 0, 0], [0.06, 0.9, 0]]), np.array([[0, 0, 0], [1.0, 0, 0]])
+    for order in ([0, 1], [1, 0]):
+        cell = arranged(
+            points[order], places, np.array([[0, 0], [0, 1]]), lambda *_: np.zeros((1, 1))
+        )
+        assert cell.tolist() == order
+
+
 def test_crowded_points_still_have_a_cell_each():
     places = sheet()
     points = np.repeat(places[:40], 10, axis=0)
@@ -90,6 +103,13 @@ def test_jumps_by_hand():
     assert jumps(points, swapped, 20) == pytest.approx(20 / (2 * 20 * 19))
 
 
+@pytest.mark.parametrize(("gap", "share"), [(3.5, 0), (4.5, 1 / 3)])
+def test_a_jump_is_farther_than_four_times_to_the_nearest_point(gap, share):
+    """In a row of four cells the points lie 1 apart, but for the gap in their middle."""
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [1 + gap, 0, 0], [2 + gap, 0, 0]])
+    assert jumps(points, np.arange(4), 4) == pytest.approx(share)
+
+
 def test_transport_assigns_all_points_where_the_nearest_one_would_take_one_twice():
     made, given = torch.tensor([[0.0, 0, 0], [1, 0, 0]]), torch.tensor([[0.0, 0, 0], [-2, 0, 0]])
     assert transport(made, given).item() == pytest.approx((4 + 1) / 2)
@@ -102,6 +122,21 @@ def test_the_losses_of_the_embedding_by_hand():
     assert smoothness(2 * places, near).item() == pytest.approx(4)
     assert repulsion(places).item() == pytest.approx(2 * 0.5**2 + (1.5 - 2**0.5) ** 2, abs=1e-5)
     assert repulsion(2 * places).item() == 0
+
+
+def test_six_nearest_others_are_kept_together(monkeypatch):
+    asked = []
+
+    def spy(_, near):
+        asked.append(near)
+        return torch.ones(())
+
+    monkeypatch.setattr(reggeonet_networks, "smoothness", spy)
+    anchors = ball(20).points.copy()
+    _, (row,) = reggeonet_networks.embedded(anchors, 1, None, seed=0)
+    assert row.values["smoothness"] == pytest.approx(0.3)
+    nearest = squared_distances(anchors, anchors).argsort(axis=1)[:, 1:7]
+    assert asked[0].tolist() == nearest.tolist()
 
 
 def test_anchors_lie_far_from_one_another():
@@ -120,6 +155,11 @@ def test_a_patch_lies_in_its_plane_turned_towards_the_anchors_around():
         ahead = 3 * np.pad(axes, ((0, 0), (0, 1))) @ turn
         found = flattened(points, ahead)
         np.testing.assert_allclose(found, (flat - flat.mean(axis=0)) @ axes.T, atol=1e-12)
+    # One point, or points on a line along an axis, lie at the first border of what they fill.
+    np.testing.assert_allclose(fitted_to(found[:1], centres(4)), [[-0.75, -0.75]])
+    np.testing.assert_allclose(
+        fitted_to([[3, 5], [4, 5]] * np.ones((2, 2)), centres(4))[:, 1], -0.75
+    )
     filled = fitted_to(found, centres(4))
     assert filled.min(axis=0) == pytest.approx([-0.75, -0.75])
     assert filled.max(axis=0) == pytest.approx([0.75, 0.75])
@@ -128,6 +168,9 @@ def test_a_patch_lies_in_its_plane_turned_towards_the_anchors_around():
 def test_the_way_to_the_anchors_ahead():
     ahead = steps_ahead(np.stack([*np.mgrid[:3, :3], np.zeros((3, 3))], axis=2))
     np.testing.assert_allclose(ahead, np.tile(np.eye(3)[:2], (9, 1, 1)))
+    corners = steps_ahead(np.stack([*np.mgrid[:2, :2], np.zeros((2, 2))], axis=2))
+    np.testing.assert_allclose(corners, np.tile(np.eye(3)[:2], (4, 1, 1)))
+    np.testing.assert_allclose(steps_ahead(np.zeros((1, 1, 3))), np.eye(3)[None, :2])
 
 
 @pytest.mark.parametrize("kind", BOTH)
@@ -196,6 +239,12 @@ def test_each_part_of_reggeonet_takes_jumps_away(monkeypatch):
     with monkeypatch.context() as changed:
         changed.setattr(reggeonet, "flattened", lambda points, _: flattened(points, np.eye(3)[:2]))
         assert whole < found()
+
+
+@pytest.mark.parametrize(("subset", "anchors"), [(100, 25), (10, 9)])
+def test_an_anchor_has_sixteen_cells_or_more_where_a_step_takes_fewer_points(subset, anchors):
+    method = RegGeoNet(iterations=1, subset=subset)
+    assert method.parameterize(ball(400), seed=0).report["anchors"] == anchors
 
 
 def test_a_patch_of_flattening_net_is_small_enough_to_assign(monkeypatch):

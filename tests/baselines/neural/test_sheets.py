@@ -6,8 +6,11 @@ import torch
 
 from baselines.neural.atlasnet import AtlasNet
 from baselines.neural.atlasnet_networks import AtlasNetworks, chamfer
+from baselines.neural.diffsr_networks import DiffSRNetworks
+from baselines.neural.flattening_net import FlatteningNet
 from baselines.neural.foldingnet import FoldingNet
 from baselines.neural.foldingnet_networks import FoldingNetworks, TwoFolds
+from baselines.neural.nsm import NSM
 from baselines.neural.nuvo import Nuvo
 from baselines.neural.sheets import (
     corner_rows,
@@ -17,6 +20,7 @@ from baselines.neural.sheets import (
     packed,
     preimages,
 )
+from parapoint import clock
 from parapoint.errors import InputError
 from parapoint.surfaces.surface import PointCloud
 from parapoint.testing import irregular_disk
@@ -45,12 +49,14 @@ def test_the_preimage_of_a_point_of_a_sheet_is_its_place():
 
 
 def test_the_preimage_of_a_point_beside_a_sheet_is_below_it_or_on_its_border():
-    points = torch.tensor([[0.0, 0.0, -0.2], [1.2, 0.0, 0.5], [0.5, 0.5, 0.25]])
+    beside = [[1.2, 0.0, 0.5], [-1.2, 0.0, 0.5], [0.0, 1.2, 0.5], [0.0, -1.2, 0.5]]
+    points = torch.tensor([[0.0, 0.0, -0.2], [0.5, 0.5, 0.25], *beside])
     normal = torch.tensor([-0.5, -0.5, 1.0])
-    points[2] += 0.1 * normal
+    points[1] += 0.1 * normal
     found, distance = preimages(bowl, points)
-    np.testing.assert_allclose(found, [[0, 0], [1, 0], [0.5, 0.5]], atol=1e-3)
-    np.testing.assert_allclose(distance, [0.2, 0.2, 0.1 * normal.norm()], rtol=1e-4)
+    np.testing.assert_allclose(found[:2], [[0, 0], [0.5, 0.5]], atol=1e-3)
+    np.testing.assert_allclose(found[2:], [[1, 0], [-1, 0], [0, 1], [0, -1]], atol=1e-3)
+    np.testing.assert_allclose(distance, [0.2, 0.1 * normal.norm(), *[0.2] * 4], rtol=1e-4)
 
 
 def test_each_point_goes_to_the_nearest_sheet():
@@ -74,6 +80,13 @@ def test_charts_are_packed_apart_each_by_its_area():
     assert np.ptp(second, axis=0) == pytest.approx(np.sqrt(0.2) * np.ones(2), abs=0.02)
     boxes = [(of.min(axis=0), of.max(axis=0)) for of in (first, second)]
     assert (boxes[0][1] < boxes[1][0]).any() or (boxes[1][1] < boxes[0][0]).any()
+
+
+def test_squares_of_equal_area_fill_a_square():
+    corners = np.tile([[-1, -1], [1, 1]], (16, 1))
+    uv = packed(corners, np.arange(16).repeat(2), np.full(16, 1 / 16))
+    np.testing.assert_allclose(uv[1::2] - uv[::2], 0.25)
+    np.testing.assert_allclose(np.ptp(uv, axis=0), 1, atol=0.1)  # and the room between them
 
 
 def test_a_face_lies_in_the_chart_of_most_corners_and_vertices_are_doubled_at_the_border():
@@ -104,6 +117,14 @@ def test_the_loss_falls_and_the_report_says_what_ran(method):
     assert result.corners.shape == mesh.faces.shape
 
 
+def test_a_fit_ends_where_its_time_is_over(monkeypatch):
+    """A second passes at each look at the clock: when a step begins, and when it has ended."""
+    monkeypatch.setattr(clock, "worked", map(float, range(100)).__next__)
+    network = torch.nn.Linear(2, 1)
+    steps = list(fitted(network, lambda: {"all": network.weight.square().sum()}, 100, 4.5))
+    assert [step.seconds for step in steps] == [2, 4]
+
+
 def test_time_ends_a_fit():
     networks = FoldingNetworks([TwoFolds(generator())])
     given = torch.rand(100, 3, generator=generator())
@@ -115,7 +136,8 @@ def test_time_ends_a_fit():
 
 def test_a_gpu_breaks_the_promise_of_those_alone_that_train_on_it(monkeypatch):
     monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
-    assert FoldingNet().deterministic
+    for method in (FoldingNet(), FlatteningNet(), NSM()):
+        assert method.deterministic
     assert not Nuvo().deterministic
 
 
@@ -140,11 +162,24 @@ def test_the_second_folding_works_on_what_the_first_has_made():
     assert len(fold.second.layers[0]) == 4  # three coordinates and a 1
 
 
+@pytest.mark.parametrize("kind", [AtlasNetworks, DiffSRNetworks])
+def test_the_sheets_share_the_places_of_a_step(kind):
+    networks, drawn = kind(3, generator()), []
+    for sheet in networks.sheets:
+        sheet.register_forward_hook(lambda _, x, __: drawn.append(x[0].shape[1]))
+    networks.terms(torch.rand(50, 3, generator=generator()), 100, generator())
+    assert drawn == [34, 34, 34]
+
+
 def test_sheets_have_weights_of_their_own():
     sheets = AtlasNetworks(3, generator()).sheets
     x = torch.zeros(1, 1, 2)
     made = torch.stack([sheet(x)[0, 0] for sheet in sheets])
     assert len(torch.unique(made, dim=0)) == 3
+
+
+def test_one_square_will_do_and_so_will_64():
+    assert [AtlasNet(charts=charts).charts for charts in (1, 64)] == [1, 64]
 
 
 @pytest.mark.parametrize("charts", [0, 65])

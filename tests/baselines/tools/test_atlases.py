@@ -13,7 +13,7 @@ from baselines.tools.meshlab import matched_faces
 from baselines.tools.optional import Missing, optional
 from parapoint.errors import InputError
 from parapoint.files.mesh_writers import write_textured
-from parapoint.method import MissingError
+from parapoint.method import MissingError, UnsupportedError
 from parapoint.planar.domains import FlatteningError
 from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.parameterization import Charted
@@ -111,6 +111,24 @@ def test_atlas_refuses_faces_that_are_not_the_mesh_s():
         atlas(mesh, corners=mesh.faces, **{**given, "uv": np.full((len(rows), 2), np.nan)})
 
 
+def test_pages_lie_side_by_side_and_faces_on_none_are_counted():
+    """A triangle each on pages 0 and 1, one on no page, and one with a corner on none."""
+    faces = np.arange(12).reshape(-1, 3)
+    uv = np.tile([[0.0, 0], [1, 0], [0, 1]], (4, 1))
+    page = np.array([0, 0, 0, 1, 1, 1, -1, -1, -1, 2**32 - 1, 0, 0])
+    made = atlas(
+        Mesh(np.eye(3)[np.arange(12) % 3], faces),
+        source=np.arange(12),
+        corners=faces,
+        uv=uv,
+        page_size=(20, 10),
+        page=page,
+    )
+    assert made.report == {"unplaced_faces": 2}
+    shift = np.repeat([[0, 0], [20, 0], [0, 0], [0, 0]], 3, axis=0)
+    assert_allclose(made.uv, uv * [20, 10] + shift)
+
+
 def test_rows_are_numbered_as_they_first_appear():
     rows = np.random.default_rng(1).integers(-2, 3, size=(400, 3)) / 2
     rows[::7] *= -1.0  # -0.0 equals 0.0
@@ -152,6 +170,8 @@ def test_meshlab_voronoi_maps_faces_in_order():
     mesh = sphere()
     result = mapped("meshlab_voronoi(regions=8)", mesh)
     assert 2 <= len(np.unique(result.charts())) <= 12
+    with pytest.raises(UnsupportedError, match="at least 92 vertices for 46 regions; there are 90"):
+        mapped("meshlab_voronoi(regions=46)", mesh)
     # Corners in the wrong place would break each triangle: the cells of a sphere are mild.
     ratios = edge_ratios(mesh, result)
     assert np.median(ratios.max(axis=1) / ratios.min(axis=1)) < 1.5
@@ -161,8 +181,19 @@ def test_meshlab_triangles_are_one_chart_each():
     pytest.importorskip("pymeshlab")
     result = mapped("meshlab_triangles", sphere())
     assert len(np.unique(result.charts())) == len(sphere().faces)
+    close, apart = (
+        np.abs(signed_areas(made.uv, made.corners)).sum()
+        for made in (mapped(f"meshlab_triangles(border={b})", sphere()) for b in (0, 8))
+    )
+    assert apart < 0.8 * close
     with pytest.raises(FlatteningError, match="Failed to apply filter"):
         mapped("meshlab_triangles(page_size=8)", sphere())
+
+
+def test_meshlab_says_nothing(capfd):
+    pytest.importorskip("pymeshlab")
+    mapped("meshlab_harmonic", irregular_disk())
+    assert capfd.readouterr().out == ""
 
 
 def test_a_filter_that_fails_leaves_meshlab_whole(tmp_path):
@@ -207,8 +238,9 @@ def test_uvatlas_options_reach_the_library():
     assert np.ptp(close.uv, axis=0).max() <= 128
     used = [np.abs(signed_areas(made.uv, made.corners)).sum() for made in (close, apart)]
     assert used[1] < 0.8 * used[0]
-    with pytest.raises(InputError, match="max_stretch must lie between 0 and 1"):
-        registry.method("uvatlas(max_stretch=3)")
+    for stretch in (1.1, -0.1):
+        with pytest.raises(InputError, match="max_stretch must lie between 0 and 1"):
+            registry.method(f"uvatlas(max_stretch={stretch})")
 
 
 def test_missing_package_says_what_to_install():

@@ -146,6 +146,12 @@ def test_without_blender_it_is_said_how_to_get_it(name, monkeypatch):
         method.parameterize(irregular_disk(), seed=0)
 
 
+@pytest.mark.parametrize("name", METHODS)
+def test_a_run_installs_blender_where_no_interpreter_is_named(name):
+    needed = () if os.environ.get(blender.INTERPRETER) else ("bpy>=4.3",)
+    assert registry.describe(name).environment == needed
+
+
 def test_interpreter_without_bpy_says_so(monkeypatch):
     monkeypatch.setenv(blender.INTERPRETER, sys.executable)
     with pytest.raises(MissingError, match=r"cannot import bpy \(No module named 'bpy'\)"):

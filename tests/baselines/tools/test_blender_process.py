@@ -61,6 +61,11 @@ class Layers(dict):
 log = []
 
 
+def empty(use_empty):
+    print("empty", use_empty)
+    assert use_empty, "there is another mesh in the scene"
+
+
 def unwrap(**options):
     log.append(["unwrap", options])
     with open(options["log"], "w") as file:
@@ -81,7 +86,7 @@ data = space(
     meshes=space(new=lambda name: Mesh(log)), objects=space(new=lambda name, mesh: "thing")
 )
 ops = space(
-    wm=space(read_factory_settings=lambda use_empty: print("empty", use_empty)),
+    wm=space(read_factory_settings=empty),
     object=space(mode_set=lambda mode: log.append(["mode", mode])),
     mesh=space(select_all=lambda action: log.append(["select", action])),
     uv=space(unwrap=unwrap),

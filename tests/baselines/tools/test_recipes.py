@@ -182,6 +182,14 @@ def test_faces_are_found_again_whatever_their_order():
     assert_allclose(made.uv[made.corners], mesh.vertices[mesh.faces][:, :, :2], atol=1e-4)
 
 
+def test_what_comes_back_in_order_is_kept_corner_by_corner():
+    """Two corners of a face without area lie on one place; no search could tell them apart."""
+    mesh = Mesh([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0]], [[0, 1, 2], [1, 2, 3]])
+    uv = np.array([[0.0, 0], [1, 0], [0, 1], [2, 0]])
+    made = in_order(mesh, Parameterization(uv, mesh.faces), mesh)
+    assert_allclose(made.uv[made.corners], uv[mesh.faces])
+
+
 @pytest.mark.parametrize("fault", ["moved", "missing", "another"])
 def test_other_faces_are_not_taken_for_the_surface_s(fault):
     mesh = irregular_disk()

@@ -37,3 +37,31 @@ def test_a_unit_for_float32() -> None:
     points = np.array([[5e5, 5e6, 0], [5e5 + 2, 5e6, 0], [5e5, 5e6 + 1, 0]])
     inside = in_unit(points, np.array([[0, 1, 2]]))
     assert np.linalg.norm(inside, axis=1).max() == pytest.approx(UNIT)
+
+
+@pytest.mark.parametrize(
+    ("name", "option", "value", "power"),
+    [
+        ("xatlas", "max_chart_area", 0.5, 2),
+        ("xatlas", "max_boundary_length", 3.0, 1),
+        ("xatlas", "texels_per_unit", 30.0, -1),
+        ("uvunwrap", "max_chart_area", 0.5, 2),
+        ("uvunwrap", "max_boundary_length", 3.0, 1),
+    ],
+)
+def test_options_that_are_lengths_are_in_the_unit_of_the_surface(
+    name: str, option: str, value: float, power: int
+) -> None:
+    """On a surface a thousand times as large they make the same charts, so many times as large."""
+    pytest.importorskip(name)
+    mesh, found = sphere(), []
+    for unit in (1.0, 1024.0):
+        _, method = registry.method(f"{name}({option}={value * unit**power})")
+        result = method.parameterize(Mesh(unit * mesh.vertices, mesh.faces), seed=0)
+        assert isinstance(result, Parameterization)
+        charts = result.charts()
+        found.append([charts.max(), *np.ptp(result.uv, axis=0)])
+        if option == "max_chart_area":
+            areas = np.bincount(charts, unit**2 * mesh.face_areas)
+            assert 0.8 * value * unit**2 < areas.max() <= value * unit**2
+    assert found[1] == pytest.approx(found[0], rel=1e-2)
