@@ -149,22 +149,24 @@ def _meeting(of: Complex, pairs: IntArray) -> FloatArray:
 
 
 def _poles(of: Complex) -> IntArray:
-    """(n, 2) the tetrahedra of both poles of each site that has two.
+    """(n, 2) the tetrahedra of both poles of each point that has two.
 
-    The first has the largest ball through the site, the second the largest of those whose centres
+    The first has the largest ball through the point, the second the largest of those whose centres
     are on the other side.
     """
+    points = len(of.sites) - 8
     order = np.argsort(of.radii, kind="stable")
 
     def largest(among: IntArray) -> IntArray:
-        """(sites,) of the corners `among`, the last one of each site as a tetrahedron, or -1."""
+        """(points,) of the corners `among`, the last one of each point as a tetrahedron, or -1."""
         found = np.full(len(of.sites), -1, dtype=np.int64)
         found[corner[among]] = among  # the last one stays
-        return np.where(found < 0, -1, tetrahedron[found])
+        return np.where(found < 0, -1, tetrahedron[found])[:points]
 
     tetrahedron, corner = np.repeat(order, 4), of.tetrahedra[order].reshape(-1)
-    first = largest(np.arange(len(corner)))
-    outwards = of.centres[first] - of.sites
-    at = of.centres[tetrahedron] - of.sites[corner]
-    second = largest(np.flatnonzero((at * outwards[corner]).sum(axis=1) < 0))
+    inner = np.flatnonzero(corner < points)
+    first = largest(inner)
+    outwards = of.centres[first] - of.sites[:points]
+    at = of.centres[tetrahedron[inner]] - of.sites[corner[inner]]
+    second = largest(inner[(at * outwards[corner[inner]]).sum(axis=1) < 0])
     return np.stack([first, second], axis=1)[second >= 0]

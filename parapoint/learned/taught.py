@@ -145,7 +145,7 @@ def teach_gates(cut: GatedCut, start: Start, seed: int, steps: int, seconds: flo
         seconds: after which it ends even so.
     """
     parameters = list(cut.gate.parameters())
-    device = next(cut.parameters()).device
+    device = parameters[0].device
     points, gates = (
         torch.as_tensor(of, dtype=torch.float32, device=device)
         for of in (start.points, start.gates)
