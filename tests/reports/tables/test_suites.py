@@ -2,10 +2,11 @@ import math
 
 import pytest
 
-from reports.contents import contents
+from reports.contents import ANGLE, contents
+from reports.tables import suites
 from reports.tables.formats import comma_separated
-from reports.tables.notes import load_notes
-from reports.tables.suites import comparison, conformality, failures, supplement
+from reports.tables.notes import BUSY, load_notes
+from reports.tables.suites import comparison, conformality, everything, failures, supplement
 
 from ..conftest import DEVIL, HAND, HOSTILE, NEFERTITI, Writer, flat, sheet
 
@@ -88,6 +89,18 @@ def test_comparison_by_hand(tmp_path, name, arrow, worst, marks):
     assert [shown["LSCM"], shown["ARAP"]] == marks
 
 
+@pytest.mark.parametrize(("count", "shown"), [(0, "(0)"), (12, "m10, m11)"), (13, "(13)")])
+def test_few_common_models_are_named(results, monkeypatch, count, shown):
+    names = [f"m{number}" for number in range(count)]
+    monkeypatch.setattr(suites, "common_cases", lambda *_: names)
+    assert shown in comparison(contents(results)[0], [ANGLE]).caption
+
+
+def test_in_the_table_of_all_cells_only_names_are_words(results):
+    made = everything(contents(results)[0])
+    assert [column.key for column in made.columns if column.text] == ["case", "method", "status"]
+
+
 def test_failures_are_told_with_status_and_reason(results):
     made = failures(contents(results)[0])
     told = {row["status"]: row["reason"] for row in made.blocks[0]}
@@ -132,11 +145,11 @@ def test_fractions_are_per_cent_in_the_comparison_and_so_in_its_csv(tmp_path):
 def test_a_busy_machine_is_told_beside_the_times(tmp_path):
     writer = Writer(tmp_path)
     with writer.store.writing():
-        for case, load in (("a", 0.9), ("b", 3.24), ("c", None)):
+        for case, load in (("a", 0.9), ("b", 3.24), ("c", None), ("d", BUSY)):
             writer.cell(case, sheet(), "lscm", {}, result=flat(sheet()), load=load, cpu_seconds=0.2)
     suite = contents(tmp_path)[0]
     (note,) = load_notes(suite)
-    assert note.startswith("The machine was busy during 1 of 3 cells (up to 3.2 processes")
+    assert note.startswith("The machine was busy during 1 of 4 cells (up to 3.2 processes")
     assert all(note in made.notes for made in (supplement(suite), comparison(suite)))
     times = {
         row["name"]: row["mean"] for row in comparison(suite, ["seconds", "cpu_seconds"]).blocks[1]
