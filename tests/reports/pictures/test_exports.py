@@ -40,7 +40,11 @@ def test_other_programs_read_the_exports_back(tmp_path, mesh, result):
     np.testing.assert_array_equal(again.faces, mesh.faces)
     np.testing.assert_allclose(read.uv[read.corners], expected, atol=1e-15)
     shape = trimesh.load_mesh(tmp_path / "map.glb", process=False)
-    assert shape.visual.material.baseColorTexture.size == (1024, 1024)
+    material = shape.visual.material
+    assert material.baseColorTexture.size == (1024, 1024)
+    # Colours as they are, of no metal and no mirror, and on the back of an open mesh, too.
+    assert material.doubleSided
+    assert material.metallicFactor == 0 < material.roughnessFactor < 1
     np.testing.assert_allclose(shape.visual.uv[shape.faces], expected, atol=1e-6)
     np.testing.assert_allclose(shape.triangles, mesh.vertices[mesh.faces], atol=1e-6)
     lab = pymeshlab.MeshSet()
