@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
 
 import pytest
+from rich.console import Console
 
 from reports import progress
 from reports.progress import QUIET, Shown
@@ -35,6 +37,16 @@ def test_a_report_says_how_far_it_is_once_a_minute_and_at_the_end(
         "smoke: pictures 5/6 (120 s)",
         "smoke: pictures 6/6 (122 s)",
     ]
+
+
+def test_a_bar_on_a_terminal_is_wiped_off_at_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn = io.StringIO()
+    console = Console(file=drawn, force_terminal=True, width=80)
+    monkeypatch.setattr(progress, "terminal", lambda **_: console)
+    assert list(Shown().track(iter("abc"), "smoke: pictures", 3)) == list("abc")
+    assert "smoke: pictures" in drawn.getvalue()
+    assert "3/3" in drawn.getvalue()
+    assert drawn.getvalue().endswith("\x1b[2K")
 
 
 def test_nothing_to_do_and_a_quiet_report_say_nothing(

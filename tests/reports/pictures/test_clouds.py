@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from benchmarks.metrics.pointwise import point_map
 from benchmarks.rendering.camera import camera
 from benchmarks.rendering.maps import FIELDS, Map, normal_colours
 from benchmarks.rendering.scene import Scene
@@ -119,6 +120,17 @@ def test_a_cloud_is_seen_with_its_normals_or_without():
         blue = shades[:, 2] > shades[:, 0] + 40  # of the two tones of the board, both are there
         assert 0.2 < blue.mean() < 0.8
         assert greens(made["seams"]) == 0
+
+
+@pytest.mark.parametrize(("fields", "side"), [(2, np.sqrt(2) / 2), (50, 5 / 19)])
+@pytest.mark.parametrize("scale", [1.0, 3.0])
+def test_a_field_on_a_cloud_is_a_share_of_its_diagonal_but_holds_five_points(fields, side, scale):
+    """A square of 20 by 20 points, mapped as it is or enlarged: fields grow with it."""
+    points = np.stack(np.meshgrid(*[np.arange(20) / 19] * 2), axis=2).reshape(-1, 2)
+    cloud = PointCloud(np.pad(points, ((0, 0), (0, 1))))
+    portrait = clouds.Portrait(cloud, 16, 1, fields)
+    found = point_map(cloud, PointParameterization(scale * points))
+    assert portrait._field(found) / np.ptp(found.uv[:, 0]) == pytest.approx(side)
 
 
 def test_where_a_map_of_a_cloud_tears_is_green():

@@ -140,6 +140,16 @@ def test_a_damaged_map_is_told_and_the_rest_drawn(results, tmp_path):
     assert len(list((tmp_path / "pictures").glob("*.webp"))) == 3 * 2 + 6 * 7 + 3 * 4
 
 
+def test_a_model_that_could_not_be_had_does_not_keep_the_next_from_being_drawn(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        writer.cell("gone", None, "lscm", {}, status="skipped")
+        writer.cell("here", sheet(3), "lscm", {}, status="failed")
+    assert draw(contents(tmp_path)[0], tmp_path / "pictures", 1) == []
+    names = {path.name for path in (tmp_path / "pictures").glob("*.webp")}
+    assert names == {"here.mesh-1.webp", "here.mesh-2.webp"}
+
+
 def test_the_artist_s_map_is_drawn_where_a_model_came_with_one(tmp_path):
     mesh = sheet()
     writer = Writer(tmp_path)

@@ -5,7 +5,8 @@ import trimesh
 
 from parapoint.errors import InputError
 from parapoint.files.reading import read_parameterized
-from parapoint.surfaces.parameterization import Parameterization
+from parapoint.surfaces.parameterization import Parameterization, PointParameterization
+from parapoint.surfaces.surface import PointCloud
 from parapoint.testing import similar
 from reports.contents import contents
 from reports.pictures import exports
@@ -105,8 +106,11 @@ def test_exports_are_the_same_anywhere_and_in_any_unit(tmp_path, ending, shift, 
 def test_exports_are_written_once_and_faults_told(tmp_path):
     writer = Writer(tmp_path)
     with writer.store.writing():
-        row = writer.cell(HAND, sheet(), "lscm", {}, result=flat(sheet()))
         lost = writer.cell(HAND, sheet(), "slim", {}, result=flat(sheet(), 0.5))
+        writer.cell(HAND, sheet(), "arap", {}, status="failed")
+        cloud = PointCloud(sheet().vertices)
+        writer.cell("scan", cloud, "lscm", {}, result=PointParameterization(cloud.points[:, :2]))
+        row = writer.cell(HAND, sheet(), "lscm", {}, result=flat(sheet()))
     (tmp_path / lost.uv_file).unlink()
     suite = contents(tmp_path)[0]
     report = tmp_path / "report"

@@ -16,6 +16,7 @@ from pypdf import PdfReader
 from pypdf.generic import StreamObject
 
 from parapoint.surfaces.parameterization import Parameterization, TracePoint
+from parapoint.surfaces.preparation import CUT
 from reports import contents as contents_module
 from reports.contents import ANGLE, AREA, FLIPPED_OFF_SEAM, ISOMETRIC, SEAM, contents
 from reports.labels import Label
@@ -199,6 +200,17 @@ def test_a_cut_is_named_and_shown_from_its_side(tmp_path, monkeypatch, case, art
     assert kinds == ["mesh-1", *ARTIST_PICTURES * artist, view, "layout", view, "layout"]
 
 
+@pytest.mark.parametrize(("preprocessing", "cut"), [("", "uncut"), (CUT, "automatic cut")])
+def test_a_missing_map_is_told_to_be_cut_where_others_are(tmp_path, preprocessing, cut):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for method in ("slim", "parapoint"):
+            writer.cell(HAND, None, method, {}, status="failed")
+        writer.cell(HAND, None, "lscm", {}, status="failed", preprocessing=preprocessing)
+    said = texts(galleries.cut_model(contents(tmp_path)[0], HAND, tmp_path))
+    assert {f"(b) SLIM, {cut}", "(c) ParaPoint, learned seam"} <= set(said)
+
+
 def test_values_that_are_not_finite_or_not_known_are_not_printed(suite):
     row, *_ = suite.rows
     assert galleries.values_text(suite, row).startswith("angle 0.1930   area ")
@@ -222,9 +234,9 @@ def test_convergence_draws_the_quality_along_the_way(suite, tmp_path):
 def test_convergence_draws_each_seed_and_no_cell_that_failed(tmp_path):
     writer = Writer(tmp_path)
     with writer.store.writing():
+        writer.cell(HAND, sheet(), "slim", {}, status="timeout", seed=3)
         for seed in range(3):
             writer.cell(HAND, sheet(), "slim", {}, result=flat(sheet(), seed / 8), seed=seed)
-        writer.cell(HAND, sheet(), "slim", {}, status="timeout", seed=3)
     suite = contents(tmp_path)[0]
     (panel,) = plots.convergence(suite, tmp_path, [HAND], ANGLE).axes
     of_rows = suite.measured.set_index("seed")[ANGLE]
@@ -249,6 +261,18 @@ def test_flips_on_the_way_are_percents_of_the_faces_that_span_no_seam(tmp_path):
     first, last = line.get_ydata()
     assert last == 0  # the faces at the date line, turned over, span it
     assert 45 < first < 55
+
+
+def test_a_state_on_the_way_that_cannot_be_measured_is_passed_over(tmp_path):
+    mesh = sheet(3)
+    uv = flat(mesh).uv
+    way = (uv, np.full_like(uv, np.nan), uv)
+    trace = tuple(TracePoint(k, 1.0 + k, {}, one) for k, one in enumerate(way))
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        result = dataclasses.replace(flat(mesh), trace=trace)
+        row = writer.cell(HAND, mesh, "slim", {}, result=result)
+    assert curves_of(contents(tmp_path)[0], row, tmp_path).way[:, 0].tolist() == [1.0, 3.0]
 
 
 def test_losses_are_those_of_the_trace(suite):

@@ -78,6 +78,8 @@ def test_the_cells_are_json_with_every_metric(suite):
     assert given["shown"] == [name for name in SHOWN if name in names]
     assert set(SHOWN).difference(names) == {POINT_ANGLE, POINT_AREA, POINT_COLLISIONS, POINT_TEARS}
     assert names[-2:] == ["seconds", "cpu_seconds"]
+    groups = {metric["name"]: metric["group"] for metric in given["metrics"]}
+    assert [groups[name] for name in (ANGLE, AREA, "seconds")] == ["angles", "areas", "cost"]
     (only,) = given["suites"]
     assert [model["name"] for model in only["models"]] == [HAND, DEVIL, NEFERTITI]
     assert len(only["cells"]) == len(suite.rows)

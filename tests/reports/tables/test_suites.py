@@ -2,10 +2,13 @@ import math
 
 import pytest
 
+from parapoint.surfaces.parameterization import PointParameterization
+from parapoint.surfaces.surface import PointCloud
 from reports.contents import ANGLE, contents
 from reports.tables import suites
+from reports.tables.bakes import bakes
 from reports.tables.formats import comma_separated
-from reports.tables.notes import BUSY, load_notes
+from reports.tables.notes import BUSY, environment_note, load_notes
 from reports.tables.suites import comparison, conformality, everything, failures, supplement
 
 from ..conftest import DEVIL, HAND, HOSTILE, NEFERTITI, Writer, flat, sheet
@@ -140,6 +143,30 @@ def test_fractions_are_per_cent_in_the_comparison_and_so_in_its_csv(tmp_path):
     assert made.cells[0][0][0].text == "flipped faces % ↓"
     assert made.cells[0][0][2].text == "1.25"
     assert comma_separated(made).splitlines()[1].split(",")[2] == "1.25"
+
+
+def test_only_the_runs_of_a_suite_are_told_and_what_is_not_known_of_them(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        writer.store.add_run({"commit": "another", "cpu": "B"})
+        writer.store.add_run({"commit": "0123456789abcdef", "cpu": "A"})
+        writer.cell("a", None, "lscm", {}, status="failed", run=1)
+    assert environment_note(contents(tmp_path)[0]) == (
+        "Run on: commit 0123456789ab, A, ? cores, Python ?. Seeds: 0."
+    )
+
+
+def test_bakes_are_told_of_the_methods_that_bake(tmp_path):
+    cloud = PointCloud(sheet(4).vertices)
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        writer.cell("wavy", cloud, "lscm", {}, status="skipped")
+        for seed, psnr in enumerate((30.0, 33.0)):
+            report = {"bake_psnr": psnr, "bake_cpu_seconds": 1.0 + seed, "charts": 4}
+            result = PointParameterization(cloud.points[:, :2])
+            writer.cell("wavy", cloud, "textured", {}, seed=seed, result=result, report=report)
+    (row,) = bakes(contents(tmp_path)[0]).blocks[0]
+    assert (row["label"], row["bake_psnr"], row["bake_cpu_seconds"]) == ("Textured", 31.5, 1.5)
 
 
 def test_a_busy_machine_is_told_beside_the_times(tmp_path):
