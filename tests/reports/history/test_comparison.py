@@ -122,6 +122,23 @@ def test_times_on_machines_that_nobody_knows_are_not_judged(tmp_path):
     assert found.times == []
 
 
+def test_a_package_that_came_or_went_is_told(tmp_path):
+    cells = [(HAND, "slim", [0.3], {})]
+    known = [{"numpy": "1", "same": "4", "gone": "3"}, {"numpy": "2", "same": "4", "new": "5"}]
+    found = Comparison(
+        *(
+            folder(tmp_path / str(side), *cells, machine=MACHINE | {"packages": packages})
+            for side, packages in enumerate(known)
+        )
+    )
+    assert found.machines == {
+        "numpy": ("1", "2"),
+        "gone": ("3", "unknown"),
+        "new": ("unknown", "5"),
+    }
+    assert found.same_hardware
+
+
 def test_times_move_beyond_a_quarter_and_a_tenth_of_a_second(tmp_path):
     def cells(short, long, other):
         return [

@@ -133,6 +133,22 @@ def test_a_field_on_a_cloud_is_a_share_of_its_diagonal_but_holds_five_points(fie
     assert portrait._field(found) / np.ptp(found.uv[:, 0]) == pytest.approx(side)
 
 
+def test_a_checkerboard_begins_with_a_light_field_on_meshes_and_on_clouds():
+    """Fields as large as the map, which lies in the first."""
+    mesh = sheet()
+    scene = Scene(mesh)
+    view = scene.view(camera(mesh, np.eye(3)[2], np.eye(3)[1]), 32, 1)
+    colours = normal_colours(scene, view.camera)
+    cloud, result = waves()
+    portrait = clouds.Portrait(cloud, 32, 1, 0.5)
+    for image in (
+        clouds.images(view, Map(mesh, flat(mesh)), colours, 0.1, 400)["dense"],
+        portrait.map(result, ("dense",))["dense"],
+    ):
+        red, _, blue, _ = image[image[..., 3] == 255].astype(int).T
+        assert not (blue > red + 40).any()  # as the dark fields are
+
+
 def test_where_a_map_of_a_cloud_tears_is_green():
     cloud, result = waves()
     portrait = clouds.Portrait(cloud, 64, 2, FIELDS)

@@ -6,6 +6,8 @@ import pytest
 from PIL import Image as Images
 
 from benchmarks.metrics import validity
+from benchmarks.rendering.scene import Scene
+from benchmarks.rendering.viewpoints import two_cameras
 from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import PointParameterization
@@ -138,6 +140,13 @@ def test_a_damaged_map_is_told_and_the_rest_drawn(results, tmp_path):
     assert len(faults) == 1
     assert "damaged" in faults[0]
     assert len(list((tmp_path / "pictures").glob("*.webp"))) == 3 * 2 + 6 * 7 + 3 * 4
+
+
+def test_the_viewer_first_looks_from_where_the_first_picture_was_taken():
+    mesh = sheet(3)
+    first, second = two_cameras(Scene(mesh))
+    facts, _ = Portrait(mesh, 16).model()[VIEWED]
+    assert facts["axes"] == first.axes.tolist() != second.axes.tolist()
 
 
 def test_a_model_that_could_not_be_had_does_not_keep_the_next_from_being_drawn(tmp_path):
