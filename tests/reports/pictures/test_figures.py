@@ -282,6 +282,19 @@ def test_losses_are_those_of_the_trace(suite):
     np.testing.assert_allclose(lines["total"].get_ydata(), [1, 1 / 2, 1 / 3])
 
 
+def test_a_loss_that_is_not_positive_is_not_drawn(tmp_path):
+    mesh = sheet(3)
+    trace = tuple(TracePoint(k, 1.0 + k, {"total": 1.0, "cycle": 0.5 * k - 0.5}) for k in range(3))
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        result = dataclasses.replace(flat(mesh), trace=trace)
+        writer.cell(HAND, mesh, "parapoint", {}, result=result)
+    (panel,) = plots.losses(contents(tmp_path)[0], [HAND]).axes
+    drawn = {line.get_label(): line.get_xydata().tolist() for line in panel.get_lines()}
+    assert drawn["cycle"] == [[2, 0.5]]
+    assert len(drawn["total"]) == 3
+
+
 def test_a_trace_of_one_point_has_no_losses(tmp_path):
     mesh = sheet(3)
     writer = Writer(tmp_path)
