@@ -6,6 +6,8 @@ import json
 import re
 import subprocess
 import sys
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -286,3 +288,33 @@ def test_score_prints_json_and_nothing_else(tmp_path, capsys):
     (tmp_path / "map.obj").write_text("\n".join(lines) + "\n")
     assert command("score", str(tmp_path / "map.obj"), "--json") == 0
     assert json.loads(capsys.readouterr().out)["angle_difference_mean"] == pytest.approx(0)
+
+
+@pytest.mark.parametrize(
+    ("missing", "arguments", "suites_run", "status"),
+    [
+        (6, [], ["paper", "builtin"], 0),
+        (6, ["--strict"], ["paper", "builtin"], 1),  # a cell of the second one has failed
+        (5, ["--strict"], ["paper"], 0),
+        (6, ["--cases", "cone"], ["paper"], 0),
+    ],
+)
+def test_the_built_in_surfaces_stand_in_for_a_whole_suite_alone(
+    missing: int,
+    arguments: list[str],
+    suites_run: list[str],
+    status: int,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[str] = []
+
+    def shown(suite: suites.Suite, *_: Path, **__: object) -> SimpleNamespace:
+        asked.append(suite.name)
+        ended = "skipped" if suite.name == "paper" else "failed"
+        lost = dict.fromkeys(suite.cases[:missing], "download it")
+        rows = [SimpleNamespace(status=ended)]
+        return SimpleNamespace(rows=rows, missing=lost, suite=suite)
+
+    monkeypatch.setattr(commands, "_shown_run", shown)
+    assert command("run", "paper", *arguments) == status
+    assert asked == suites_run

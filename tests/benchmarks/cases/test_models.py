@@ -332,6 +332,20 @@ def test_a_model_is_cut_along_the_seam_drawn_on_it(tmp_path, monkeypatch):
         models.load("torus@drawn")
 
 
+def test_a_seam_may_be_a_single_edge(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the rim of a sheet inwards it opens a slit, whose end on the rim has two copies."""
+    sheet = models.load("wavy_sheet")
+    assert isinstance(sheet, Mesh)
+    rim = set(sheet.boundary_loops[0].tolist())
+    edges = np.concatenate([sheet.faces[:, :2], sheet.faces[:, 1:]]).tolist()
+    a, b = next((a, b) for a, b in edges if a in rim and b not in rim)
+    (tmp_path / "wavy_sheet.txt").write_text(f"{a} {b}\n")
+    monkeypatch.setattr(derived, "seam_file", lambda model: tmp_path / f"{model}.txt")
+    cut = models.load("wavy_sheet@drawn")
+    assert isinstance(cut, Mesh)
+    assert len(cut.vertices) == len(sheet.vertices) + 1
+
+
 def test_each_drawn_seam_opens_its_model_to_a_disk():
     if not os.environ.get(models.MIRROR):
         pytest.skip(f"set {models.MIRROR} to check the real models")

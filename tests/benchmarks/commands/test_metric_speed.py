@@ -36,7 +36,12 @@ def test_the_table_and_the_figure(tmp_path):
         Cost("disk", 99_000, 1, 0.5, 0.5, 0.2),
         Cost("atlas", 1_000, 100, 0.01, 0.01, 0.1),
     ]
-    cells = [list(column.cells) for column in metric_table(costs).columns]
+    columns = metric_table(costs).columns
+    assert [str(column.header) for column in columns] == [
+        *("map", "faces", "charts", "seconds", "CPU seconds", "GB", "µs a face", "limit")
+    ]
+    cells = [list(column.cells) for column in columns]
+    assert [column[1] for column in cells[3:7]] == ["0.500", "0.500", "0.20", "5.1"]
     assert cells[1] == ["1,000", "99,000", "1,000"]
     assert cells[-1] == ["", "1 s, 1 GB", ""]
     growth_figure(costs, tmp_path / "growth.png")

@@ -48,6 +48,8 @@ def test_each_row_of_the_table_is_measured(monkeypatch) -> None:
         return products(*given, **how)
 
     monkeypatch.setattr(speed, "_products", noted)
+    monkeypatch.setattr("parapoint.learned.networks.products", lambda *_, **__: (2, 5))
+    monkeypatch.setattr("parapoint.learned.networks.cost", lambda _: 7)
     rows = speed.training_rates()
     assert len(rows) == 5
     assert rows[0].gflops == pytest.approx(2 * 32**3 / rows[0].cpu_seconds / 1e9)
@@ -55,6 +57,10 @@ def test_each_row_of_the_table_is_measured(monkeypatch) -> None:
     # A step of 100 points has a lattice of as many, of which Wrap takes three rows each.
     assert [(count, how["backward"]) for _, count, how in asked[::2]] == [(600, True)] * 2
     assert [how["backward"] for _, _, how in asked[1::2]] == [False] * 2
+    # Two a product: of a step forward and twice as many backward; of Cut and Unwrap in a mapping.
+    operations = [row.gflops * 1e9 * row.cpu_seconds for row in rows[1:]]
+    step, mapping = 3 * 2 * (2 * 100 + 5 * 100), 2 * 300 * (7 + 7)
+    assert operations == pytest.approx([step, mapping] * 2)
     assert all(row.fraction > 0 and row.cpu_seconds > 0 for row in rows)
     assert np.isnan(rows[0].bare_fraction)
     assert all(row.bare_fraction > 0 for row in rows[1:])

@@ -64,3 +64,12 @@ def test_the_processor_has_a_name_wherever_it_is_told(cpuinfo, known, expected, 
     monkeypatch.setattr(environment.platform, "processor", lambda: known)
     monkeypatch.setattr(environment.platform, "machine", lambda: "arm64")
     assert environment.processor.__wrapped__() == expected
+
+
+@pytest.mark.parametrize(("counted", "cores"), [(6, 6), (None, 1)])
+def test_where_a_process_has_no_cores_of_its_own_all_count(
+    counted: int | None, cores: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(environment.os, "sched_getaffinity", raising=False)
+    monkeypatch.setattr(environment.os, "cpu_count", lambda: counted)
+    assert environment.cores() == cores

@@ -7,13 +7,15 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 
 from baselines import registry
-from benchmarks.running import cell, worker
+from benchmarks.running import cell, limits, worker
 from benchmarks.running.environment import ROOT
 from benchmarks.running.tasks import Outcome, Prepared, Ready, RunJob, from_json, to_json
 from benchmarks.store.archives import read_map, read_surface
@@ -140,13 +142,14 @@ def test_a_message_counts_only_if_it_is_whole():
 
 @pytest.mark.parametrize("forks", [True, False])
 def test_a_supervisor_does_one_cell_after_another(tmp_path, forks):
-    """Where forking is not safe, a fresh interpreter does the same."""
+    """Where forking is not safe, a fresh interpreter does the same, without what is imported."""
     if forks and not worker.FORKS:
         pytest.skip("no forks on this system")
     with Store(tmp_path).writing():
         surface = Store(tmp_path).add_surface(TRIANGLE)
     name = f"Still{forks}"  # plugins stay for the process: each needs a name of its own
     (tmp_path / "plugin.py").write_text(
+        "import sys\n"
         "from dataclasses import dataclass\n"
         "from typing import ClassVar\n"
         "from parapoint import Parameterization\n"
@@ -154,7 +157,7 @@ def test_a_supervisor_does_one_cell_after_another(tmp_path, forks):
         f"class {name}:\n"
         "    requires: ClassVar[frozenset[str]] = frozenset()\n"
         "    def parameterize(self, surface, *, seed):\n"
-        "        print('hello')\n"
+        "        print('a fork:', 'benchmarks.running.worker' in sys.modules)\n"
         "        return Parameterization(surface.vertices[:, :2] + seed, surface.faces)\n"
     )
     plugin = f"{tmp_path}/plugin.py:{name}"
@@ -195,7 +198,7 @@ def test_a_supervisor_does_one_cell_after_another(tmp_path, forks):
             assert outcome.status == "ok", outcome
             np.testing.assert_array_equal(read_map(tmp_path / "map.npz").uv, UV + seed)
     printed, _ = process.communicate(timeout=30)
-    assert printed == b"hello\nhello\n"
+    assert printed.decode() == f"a fork: {forks}\n" * 2
     assert process.returncode == 0
 
 
@@ -260,3 +263,30 @@ def test_a_supervisor_parses_a_plugin_and_does_not_run_it(tmp_path):
 @pytest.mark.parametrize("spec", ["mine(step=1)", "no spec (", "tutte"])
 def test_a_supervisor_leaves_faults_of_a_spec_or_a_plugin_to_the_cell(spec):
     worker._parse.__wrapped__(spec, ("missing.py:Mine",))
+
+
+@pytest.mark.skipif(not limits.FORKS, reason="no such thing on this system")
+def test_a_process_ends_with_its_parent_even_where_that_is_killed() -> None:
+    code = (
+        "import os, time; from benchmarks.running.limits import end_with\n"
+        "parent = os.getpid()\n"
+        "if not os.fork():\n"
+        "    end_with(parent); print(os.getpid(), flush=True)\n"
+        "time.sleep(60)"
+    )
+    command = [sys.executable, "-c", code]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as parent:
+        assert parent.stdout is not None
+        child = psutil.Process(int(parent.stdout.readline()))
+        parent.kill()
+    end = time.monotonic() + 5
+    while child.is_running() and child.status() != psutil.STATUS_ZOMBIE:
+        assert time.monotonic() < end, "it goes on"
+        time.sleep(0.01)
+
+
+@pytest.mark.skipif(not limits.FORKS, reason="no such thing on this system")
+def test_a_process_whose_parent_has_ended_before_ends_at_once() -> None:
+    code = "from benchmarks.running.limits import end_with; end_with(-1); print('goes on')"
+    ended = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, check=False)
+    assert (ended.returncode, ended.stdout) == (1, b"")

@@ -83,6 +83,7 @@ def test_publishing_twice_changes_no_byte_and_time_none(tmp_path, archive):
 def test_an_archive_holds_rows_maps_metrics_environment_and_hashes(archive):
     with zipfile.ZipFile(archive) as content:
         names = content.namelist()
+        assert {info.external_attr >> 16 for info in content.infolist()} == {0o644}
         manifest = json.loads(content.read("manifest.json"))
         for name, digest in manifest["sha256"].items():
             assert hashlib.sha256(content.read(name)).hexdigest() == digest
