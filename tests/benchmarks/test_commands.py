@@ -11,6 +11,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from rich.table import Table
 
 from baselines import registry
 from benchmarks import __main__ as commands
@@ -316,5 +317,40 @@ def test_the_built_in_surfaces_stand_in_for_a_whole_suite_alone(
         return SimpleNamespace(rows=rows, missing=lost, suite=suite)
 
     monkeypatch.setattr(commands, "_shown_run", shown)
-    assert command("run", "paper", *arguments) == status
+    allowed: list[float] = []
+    monkeypatch.setattr("parapoint.files.decoding.allow", allowed.append)
+    assert command("run", "paper", "--memory", "1.5", *arguments) == status
     assert asked == suites_run
+    assert allowed == [1.5e9]
+
+
+def test_what_is_measured_is_a_table_each_and_a_figure_or_a_race(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    drawn: list[Path] = []
+    for module, names in {
+        "benchmarks.commands.metric_speed": ("metric_costs", "metric_table"),
+        "benchmarks.commands.method_speed": ("overheads", "overhead_table"),
+        "benchmarks.commands.speed": ("training_table",),
+    }.items():
+        for name in names:
+            monkeypatch.setattr(f"{module}.{name}", lambda *_, named=name: Table(title=named))
+    monkeypatch.setattr(
+        "benchmarks.commands.metric_speed.growth_figure", lambda _, path: drawn.append(path)
+    )
+    monkeypatch.setattr(
+        "benchmarks.checks.straightforward.race_table",
+        lambda case, seconds: Table(title=f"{case} {seconds:g}"),
+    )
+
+    def titles(*arguments: str) -> list[str]:
+        assert command("speed", *arguments) == 0
+        return capsys.readouterr().out.split()
+
+    assert titles() == ["metric_table", "overhead_table", "training_table"]
+    assert not drawn
+    assert len(titles("--figure", f"{tmp_path}/growth.PNG")) == 3
+    assert drawn == [tmp_path / "growth.PNG"]
+    assert titles("--race", "cow", "--seconds", "3") == ["cow", "3"]
+    assert command("speed", "--figure", "growth.pdf") == 2
+    assert "give a name that ends in .png" in capsys.readouterr().err

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import random
 import subprocess
 import sys
 from pathlib import Path
@@ -233,3 +234,60 @@ def test_what_a_run_adds_to_each_method_is_told(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(endurance.runner, "run", run)
     said = CliRunner().invoke(endurance.main, ["overhead", "--cells", "3"]).output
     assert said == "tutte              3 cells  2.000 s, at most 3.000 s\n"
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        ({}, None),
+        ({"faulty": {"status": "ok"}}, "ok (killed) in place of failed"),
+        ({"faulty": {"reason": ""}}, "failed () in place of failed"),
+        ({"faulty": {"params": {"fault": "scatter"}}}, "failed (killed) in place of ok"),
+        ({"instant": {"uv_sha256": "b" * 64}}, "other maps than those of a run"),
+        ({"elsewhere": {}}, "a file outside the cell's folder was changed"),
+    ],
+)
+def test_what_a_method_costs_others_is_told(
+    change: dict[str, dict[str, Any]],
+    fault: str | None,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    rows: dict[str, dict[str, Any]] = {
+        "instant": {"params": {}, "status": "ok", "uv_sha256": "a" * 64},
+        "faulty": {"params": {"fault": "segfault"}, "status": "failed", "reason": "killed"},
+    }
+
+    def run(suite: Suite, out: Path, **_: object) -> None:
+        cell = {"case": "c", "seed": 0, "source_hash": "a", "surface_hash": "", "suite": suite.name}
+        is_alone = out.name == "alone"
+        store = Store(out)
+        with store.writing():
+            for method in ("instant",) if is_alone else rows:
+                of_row = rows[method] | ({} if is_alone else change.get(method, {}))
+                about: dict[str, Any] = {"method": method, **cell, **of_row}
+                store.append(ResultRow(id=method[:1].encode().hex() * 8, **about))
+        if "elsewhere" in change and not is_alone:
+            (out / faulty.ELSEWHERE).mkdir()
+            (out / faulty.ELSEWHERE / "map.npz").write_text("ours")
+
+    monkeypatch.setattr(endurance.runner, "run", run)
+    monkeypatch.setattr(endurance.verifying, "faults", lambda _: [])
+    found = endurance.saved(tmp_path / "models", tmp_path / "out", 1)
+    said = capsys.readouterr().out
+    assert (found.reported, found.faults) == (2, int(fault is not None))
+    assert said == "" if fault is None else fault in said
+
+
+def test_files_of_a_user_are_added_and_replace_none(tmp_path: Path) -> None:
+    draw = random.Random(0)  # noqa: S311  no secret
+    (tmp_path / "lock").write_text("ours")
+    (tmp_path / "cells").write_text("a file where others would need a folder")
+    for _ in range(5):
+        before = dict(bystanders.hashes(tmp_path))
+        bystanders._fill(tmp_path, draw)
+        assert dict(bystanders.hashes(tmp_path)).items() >= before.items()
+    names = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file()}
+    assert len(names) > len(bystanders.NAMES) / 2
+    assert names <= {*bystanders.NAMES, "cells"}

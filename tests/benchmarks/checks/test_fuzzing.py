@@ -21,7 +21,8 @@ from hypothesis import strategies as st
 
 from benchmarks.checks import fuzzing
 from parapoint.errors import InputError
-from parapoint.files.reading import read_surface
+from parapoint.files.reading import FORMATS, read_surface
+from parapoint.surfaces.surface import Mesh
 
 HOSTILE = [
     b"",
@@ -210,3 +211,14 @@ def test_without_atheris_it_is_said_how_to_get_it(monkeypatch: pytest.MonkeyPatc
     ended = CliRunner().invoke(fuzzing.main, ["obj"])
     assert isinstance(ended.exception, InputError)
     assert "pip install -e '.[fuzz]'" in str(ended.exception)
+
+
+@pytest.mark.parametrize("target", [name for name in fuzzing.TARGETS if f".{name}" in FORMATS])
+def test_the_fuzzer_starts_with_files_that_can_be_read(target: str, tmp_path: Path) -> None:
+    """A square of four corners; of STL the triangles have their own, or share them."""
+    for number, content in enumerate(fuzzing.seeds(target)):
+        path = tmp_path / f"{number}.{target}"
+        path.write_bytes(content)
+        surface = read_surface(path)
+        found = surface.vertices if isinstance(surface, Mesh) else surface.points
+        assert len(found) in {4, 6}

@@ -4,6 +4,7 @@ import errno
 import json
 import random
 import subprocess
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -177,3 +178,32 @@ def test_a_disk_is_full_or_read_only_or_cannot_be_made(
     assert (system.asked[-1] == f"umount -l {place}") == is_mounted
     assert ("mount -o remount,ro" in system.asked) == (is_mounted and state == "read-only")
     assert (next(room, 0) == 0) == (is_mounted and state == "full")  # it is filled to its end
+
+
+FIVE = "import subprocess as s; a = [s.Popen(['sleep', '60']) for _ in range(4)]; a[0].wait()"
+
+
+@pytest.mark.parametrize(
+    ("victim", "code", "left"),
+    [
+        ("run", FIVE, 4),
+        ("supervisor", FIVE, 3),  # the command ends by itself, without its first process
+        ("report", "pass", 0),
+        ("report", "import time; time.sleep(60)", 0),
+    ],
+)
+def test_the_victim_alone_is_killed_and_what_is_left_is_told(
+    victim: str, code: str, left: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sleep = time.sleep
+    monkeypatch.setattr(hardships, "GONE_AFTER", 0.1)
+    monkeypatch.setattr(hardships.time, "sleep", lambda seconds: sleep(min(seconds, 0.05)))
+    found = hardships._killed(victim, ["-c", code], tmp_path, random.Random(0))  # noqa: S311
+    assert found.tried == 1
+    assert len(found.faults) == left
+    assert all(fault.startswith(f"kill of a {victim}: process ") for fault in found.faults)
+    for _ in range(100):
+        if not hardships._started("no tag", tmp_path):
+            return
+        sleep(0.02)
+    pytest.fail("what was left goes on")

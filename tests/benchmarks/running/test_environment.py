@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import psutil
 import pytest
 
@@ -73,3 +74,10 @@ def test_where_a_process_has_no_cores_of_its_own_all_count(
     monkeypatch.delattr(environment.os, "sched_getaffinity", raising=False)
     monkeypatch.setattr(environment.os, "cpu_count", lambda: counted)
     assert environment.cores() == cores
+
+
+def test_packages_that_the_project_asks_for_have_their_versions() -> None:
+    packages = environment._packages()
+    assert packages["numpy"] == np.__version__
+    assert packages["parapoint"]
+    assert not any(set(name) & set("<>=[; ") for name in packages)

@@ -105,7 +105,13 @@ def test_a_row_says_what_was_done_to_the_surface_before_and_in_which_component_i
         "automatic cut to a disk (1 of 2 components)"
     )
     receive, send = os.pipe()
+    loads = iter([0.5, 2.0])  # before and after
+    monkeypatch.setattr(cell, "load", lambda: next(loads, None))
+    began, used = time.monotonic(), time.process_time()
     outcome = cell.run(job, send)
+    assert 0 < outcome.seconds < time.monotonic() - began
+    assert 0 <= outcome.cpu_seconds < time.process_time() - used + 0.05  # the system's grain
+    assert outcome.load == 2.0
     assert worker._said(os.read(receive, 4096)) == (steps, None)
     assert (outcome.status, outcome.preprocessing) == ("ok", steps)
     mesh, result = read_surface(store.surface_path(surface)), read_map(tmp_path / "map.npz")
