@@ -354,3 +354,15 @@ def test_what_is_measured_is_a_table_each_and_a_figure_or_a_race(
     assert titles("--race", "cow", "--seconds", "3") == ["cow", "3"]
     assert command("speed", "--figure", "growth.pdf") == 2
     assert "give a name that ends in .png" in capsys.readouterr().err
+
+
+def test_a_folder_with_several_versions_of_a_suite_is_said_to_have_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = {"paper": {"1 (a)": 2, "2 (b)": 1}, "core": {"1 (c)": 5}}
+    monkeypatch.setattr("benchmarks.store.versions.versions", lambda *_: found)
+    monkeypatch.setattr("benchmarks.commands.display.print_summary", lambda _: None)
+    monkeypatch.setattr("benchmarks.running.runner.run", lambda *_, **__: "what it did")
+    assert str(commands._shown_run(suites.suite("smoke"), tmp_path)) == "what it did"
+    said = "paper in several versions: 2 of version 1 (a), 1 of version 2 (b)"
+    assert capsys.readouterr().out == f"{tmp_path} holds {said}\n"

@@ -8,6 +8,7 @@ import re
 import threading
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import igl
 import numpy as np
@@ -275,6 +276,17 @@ def test_a_download_takes_no_more_than_the_registered_size(monkeypatch, tmp_path
         server.shutdown()
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
     assert Endless.sent < 20_000_000  # what lay in buffers
+
+
+@pytest.mark.parametrize(("more", "fits"), [(0, True), (1, False)])
+def test_a_download_may_have_all_of_its_bytes_and_not_one_more(more: int, fits: bool) -> None:
+    model = replace(models.registry()["cylinder_cgal"], size=1000)
+    response = SimpleNamespace(
+        iter_content=lambda size: iter([bytes(size), bytes(1000 - size + more)]), close=bool
+    )
+    models._bound(model, response)
+    with contextlib.nullcontext() if fits else pytest.raises(InputError, match="more than 1000"):
+        assert sum(map(len, response.iter_content(600))) == 1000
 
 
 def test_the_mirror_is_used_and_checked(no_network, mirror, monkeypatch):

@@ -180,6 +180,19 @@ def test_a_disk_is_full_or_read_only_or_cannot_be_made(
     assert (next(room, 0) == 0) == (is_mounted and state == "full")  # it is filled to its end
 
 
+def test_a_command_is_run_to_its_end_and_its_last_words_are_kept(tmp_path: Path) -> None:
+    says = "import sys, benchmarks; print('here'); sys.exit('first\\nlast')"
+    done = hardships._run(["-c", says], tmp_path)
+    assert (done.returncode, done.stdout) == (1, "here\n")
+    assert hardships._said(done) == "last"
+    writes = ["-c", "from pathlib import Path; Path('file').write_text('words')"]
+    done = hardships._run(writes, tmp_path, hardships._as_it_is)
+    assert (done.returncode, hardships._said(done)) == (0, "nothing")
+    assert (tmp_path / "file").read_text() == "words"
+    done = hardships._run(writes, tmp_path, hardships._no_room)
+    assert (done.returncode, (tmp_path / "file").read_text()) == (1, "")
+
+
 FIVE = "import subprocess as s; a = [s.Popen(['sleep', '60']) for _ in range(4)]; a[0].wait()"
 
 

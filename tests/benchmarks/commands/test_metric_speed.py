@@ -25,6 +25,7 @@ def test_the_maps_are_what_they_are_called(kind, charts):
     assert values["chart_count"] == charts
     assert values["bijective"] == 1
     assert values["quasi_conformal_max"] > 1.01
+    assert values["packing_efficiency"] > 0.1  # no long strip of charts
 
 
 @pytest.mark.parametrize("kind", ["disk", "atlas"])
