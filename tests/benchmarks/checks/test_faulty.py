@@ -6,12 +6,13 @@ import errno
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from benchmarks.checks import faulty
 from parapoint.surfaces.surface import Mesh
 
-TRIANGLE = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 5]], [[0, 1, 2]])
+TRIANGLE = Mesh(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 5]]), np.array([[0, 1, 2]]))
 
 
 @pytest.fixture
@@ -26,7 +27,7 @@ def place(tmp_path: Path) -> Path:
 def test_its_fault_is_done_and_then_it_maps(monkeypatch: pytest.MonkeyPatch) -> None:
     done: list[object] = []
     monkeypatch.setattr(faulty, "FAULTS", {"odd": (lambda: done.append("odd"), "ok")})
-    monkeypatch.setattr(faulty.time, "sleep", done.append)
+    monkeypatch.setattr("benchmarks.checks.faulty.time.sleep", done.append)
     found = faulty.Faulty(fault="odd", seconds=3.0).parameterize(TRIANGLE, seed=0)
     assert done == ["odd", 3.0]
     assert found.uv.tolist() == [[0, 0], [1, 0], [0, 1]]

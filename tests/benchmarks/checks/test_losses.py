@@ -16,7 +16,7 @@ def test_losses_on_file_are_read_as_they_were_found(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(regress, "GOLDEN", tmp_path)
-    monkeypatch.setattr(losses, "TRAINED", dataclasses.replace(losses.TRAINED, name=""))
+    monkeypatch.setattr(losses, "TRAINED", dataclasses.replace(regress.TRAINED, name=""))
     found = [{"total": 1 / 3, "wrap": 0.25}, {"total": 1e-9 / 3, "wrap": 0.0}]
     losses.write_losses("paper", found)
     lines = (tmp_path / "losses_paper.csv").read_text().splitlines()
@@ -38,7 +38,7 @@ def test_losses_are_those_of_a_training_on_the_model_with_seed_0(
         asked.append(spec)
         return "parapoint", SimpleNamespace(parameterize=parameterize)
 
-    monkeypatch.setattr(losses.registry, "method", method)
-    monkeypatch.setattr(losses.models, "load", lambda name: f"the model {name}")
+    monkeypatch.setattr("baselines.registry.method", method)
+    monkeypatch.setattr("benchmarks.cases.models.load", lambda name: f"the model {name}")
     assert losses.first_losses("learned") == [{"total": 1}, {"total": 2}]
     assert asked == [losses.RUNS["learned"], (f"the model {losses.MODEL}", 0)]

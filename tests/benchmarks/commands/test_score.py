@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -123,7 +124,7 @@ def test_the_worst_faces_are_named(tmp_path):
     assert columns["notes"] == [""] * 8
 
 
-def test_what_is_wrong_with_one_of_the_worst_faces_is_noted(tmp_path):
+def test_what_is_wrong_with_one_of_the_worst_faces_is_noted(tmp_path: Path) -> None:
     path = tmp_path / "folded.obj"
     path.write_text(OBJ.replace("vt 4 1", "vt 0 5"))
     columns = {

@@ -353,7 +353,9 @@ BEND = np.pi / 4 - np.arctan(0.5)
         ("angle_difference_p95", 39, 3, BEND),
     ],
 )
-def test_a_twentieth_may_be_worse_than_the_95th_percentile(metric, squares, stretched, value):
+def test_a_twentieth_may_be_worse_than_the_95th_percentile(
+    metric: str, squares: int, stretched: int, value: float
+) -> None:
     square = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])
     corners = np.array([[0, 1, 2], [0, 2, 3]])
     at = np.arange(squares)
@@ -410,7 +412,7 @@ def test_slivers_and_tiny_triangles_are_not_degenerate():
     assert_allclose(found.sigma2, 1, rtol=1e-6)  # of a sliver, 1e-9 of whose digits are noise
 
 
-def test_the_distortion_of_some_faces_is_that_of_these_alone():
+def test_the_distortion_of_some_faces_is_that_of_these_alone() -> None:
     # The second triangle is drawn three times as large: alone it is an isometry.
     points = np.array([[0, 0], [1, 0], [0, 1], [3, 0], [4, 0], [3, 1], [9, 9], [9, 9], [9, 9.0]])
     faces = np.arange(9).reshape(3, 3)  # the last has no area and never counts

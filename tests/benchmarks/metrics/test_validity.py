@@ -320,3 +320,13 @@ def test_rows_of_a_flat_sheet_are_sound_at_its_rim_too() -> None:
     angle, sign = igl.internal_angles(lifted(bow), tie), np.ones(2, dtype=np.int64)
     found = overlap.sound_fans(Parameterization(bow, tie), sign, angle)
     assert found.tolist() == [False, True, True, True, True]
+
+
+@pytest.mark.parametrize(("depth", "overlapped"), [(1e-11, 0), (1e-9, 1)])
+def test_a_strip_that_rounding_could_make_is_no_overlap(depth: float, overlapped: int) -> None:
+    """Two triangles side by side, the one `depth` inside the other: a share of twice as much."""
+    right = [[0, 0], [1, 0], [0, 1]]
+    left = [[depth, 0], [depth, 1], [-1, 0]]
+    values = evaluate(*own_rows([right, left]))
+    assert values["overlapped_fraction"] == overlapped
+    assert values["bijective"] == 1 - overlapped

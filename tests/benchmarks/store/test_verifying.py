@@ -11,6 +11,7 @@ from benchmarks.store.archives import (
     write_arrays,
 )
 from benchmarks.store.results import Store
+from benchmarks.store.rows import ResultRow
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization
 from parapoint.surfaces.surface import PointCloud
 
@@ -45,12 +46,12 @@ def exchanged_surface(store, row):
     write_arrays(store.surface_path(row.surface_hash), arrays)
 
 
-def damaged_reference(store, row):
+def damaged_reference(store: Store, row: ResultRow) -> None:
     store.add_reference(row.surface_hash, FLAT)
     store.reference_path(row.surface_hash).write_bytes(b"PK")
 
 
-def damaged_exact(store, row):
+def damaged_exact(store: Store, row: ResultRow) -> None:
     store.add_exact(row.surface_hash, PointCloud(SQUARE.vertices))
     store.exact_path(row.surface_hash).write_bytes(b"PK")
 
