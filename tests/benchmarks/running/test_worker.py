@@ -208,6 +208,58 @@ def test_a_supervisor_does_one_cell_after_another(tmp_path, forks):
     assert process.returncode == 0
 
 
+SLEEPER = """
+import os, time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+@dataclass(frozen=True)
+class Sleeper:
+    requires: ClassVar[frozenset[str]] = frozenset()
+
+    def parameterize(self, surface, *, seed):
+        Path(__file__).with_name("cell").write_text(f"{os.getpid()} ")
+        time.sleep(60)
+"""
+
+
+@pytest.mark.skipif(not limits.FORKS, reason="a fork is told of it, another process is not")
+def test_a_supervisor_ends_with_its_cell_once_the_run_is_gone(tmp_path: Path) -> None:
+    with Store(tmp_path).writing():
+        surface = Store(tmp_path).add_surface(TRIANGLE)
+    (tmp_path / "plugin.py").write_text(SLEEPER)
+    plugin = f"{tmp_path}/plugin.py:Sleeper"
+    spec = registry.register_plugin(plugin)
+    (tmp_path / "work").mkdir()
+    job = RunJob(
+        spec=spec,
+        plugins=(plugin,),
+        seed=0,
+        source_hash=registry.source_hash(registry.method(spec)[1]),
+        surface=Store(tmp_path).surface_path(surface),
+        folder=tmp_path,
+        time_limit=60.0,
+        memory_limit=1e9,
+    )
+    receive, send = os.pipe()
+    command = [sys.executable, "-m", "benchmarks.running.worker", str(send)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, pass_fds=[send], cwd=ROOT) as process:
+        os.close(send)
+        with os.fdopen(receive, "rb") as replies:
+            assert from_json(replies.readline(), Ready) == Ready()
+            assert process.stdin is not None
+            process.stdin.write(to_json(job))
+            process.stdin.flush()
+            end = time.monotonic() + 20
+            while not (note := tmp_path / "cell").exists() or not note.read_text().endswith(" "):
+                assert time.monotonic() < end, "the cell has not begun"
+                time.sleep(0.01)
+            process.stdin.close()
+            assert process.wait(10) == 1
+    assert not psutil.pid_exists(int(note.read_text()))
+
+
 def test_a_map_that_cannot_be_written_is_the_machine_s_fault(tmp_path, monkeypatch):
     store = Store(tmp_path)
     with store.writing():
