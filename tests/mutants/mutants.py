@@ -66,6 +66,8 @@ DRAWS = frozenset({"default_rng", "manual_seed", "Random"})
 """Functions whose arguments are seeds: another is as good."""
 ABOUT = 10
 """A limit that a constant names, of at least so much, might be one more or less as well."""
+DANGEROUS = Path("benchmarks", "checks", "hardships.py")
+"""A file that is not changed: it kills what is left of a check, and with a change perhaps others."""
 
 Position = tuple[int, int]
 """Line, from 1, and column, from 0."""
@@ -142,7 +144,7 @@ def mutants(source: str) -> dict[int, dict[str, list[tuple[str, int]]]]:
 
 def sample(chance: random.Random, package: str) -> Iterator[tuple[Path, int, str, str]]:
     """Mutants of a package without end: the file, line, operator, and the source changed by it."""
-    files = sorted((ROOT / package).rglob("*.py"))
+    files = sorted(set((ROOT / package).rglob("*.py")) - {ROOT / DANGEROUS})
     sizes = [path.read_text(encoding="utf-8").count("\n") for path in files]
     while True:
         (path,) = chance.choices(files, sizes)
