@@ -67,7 +67,7 @@ DRAWS = frozenset({"default_rng", "manual_seed", "Random"})
 ABOUT = 10
 """A limit that a constant names, of at least so much, might be one more or less as well."""
 DANGEROUS = Path("benchmarks", "checks", "hardships.py")
-"""A file that is not changed: it kills what is left of a check, and with a change perhaps others."""
+"""A file that is not changed: it kills what is left of a check, and a change might kill others."""
 
 Position = tuple[int, int]
 """Line, from 1, and column, from 0."""
