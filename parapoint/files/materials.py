@@ -34,6 +34,7 @@ def libraries(source: Path) -> tuple[list[Path], bool]:
         words = line.split(None, 1)
         if len(words) == 2 and words[0] == b"mtllib":
             found += named_libraries(source.parent, words[1])
+    found = list(dict.fromkeys(found))
     return found, any(OF_PICTURE.match(line) for path in found for line in library_lines(path))
 
 
@@ -82,7 +83,7 @@ def materials_of(libraries: list[Path]) -> dict[str, Material]:
                 found[name] = Material()
             elif kind.lower() == "kd" and name:
                 found[name] = Material(_eight_bits(rest), found[name].picture)
-            elif kind.lower() == "map_kd" and name:
+            elif kind.lower() == "map_kd" and name and rest:
                 while (option := OPTION.match(rest)) is not None:
                     rest = rest[option.end() :]
                 path = named_file(library.parent, rest)

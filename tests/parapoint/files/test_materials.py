@@ -132,7 +132,7 @@ def test_a_library_that_cannot_be_read_is_named(
     """The model is read, and so are its other libraries."""
     if data is not None:
         (tmp_path / "b.mtl").write_bytes(data)
-    path = model(tmp_path, "b.mtl")
+    path = model(tmp_path, "b.mtl\nmtllib b.mtl")
     assert colours(path) == []
     said = f"{tmp_path / 'b.mtl'}: its materials are not known: it {fault}"
     assert caplog.messages == [said]
