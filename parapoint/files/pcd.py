@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from parapoint.errors import InputError
 from parapoint.files.attributes import named_attributes, taken_normals
-from parapoint.files.content import Content, points_content
+from parapoint.files.content import Content, points_content, word_counts
 from parapoint.files.decoding import check_decoded
 from parapoint.files.xyz import table, text_lines
 from parapoint.surfaces.surface import FloatArray
@@ -36,9 +36,9 @@ def pcd(data: bytes) -> Content:
     wanted = [k for k, name in enumerate(fields) if counts[k] == 1 and name != "_"]
     if encoding == "ascii":
         places = np.cumsum([0, *counts]).tolist()
-        values = table(text_lines(body)[:count], tuple(places[k] for k in wanted))
-        if len(values) != count:
-            raise InputError(f"ends early: {count} points are announced, {len(values)} follow")
+        lines = text_lines(body)
+        _check_rows(lines, count, sum(counts))
+        values = table(lines, tuple(places[k] for k in wanted))
         columns = {
             fields[k]: _packed(values[:, at], kinds[k]) if fields[k] in PACKED else values[:, at]
             for at, k in enumerate(wanted)
@@ -62,6 +62,25 @@ def pcd(data: bytes) -> Content:
     points = np.stack([columns.pop(axis) for axis in "xyz"], axis=1).astype(np.float64)
     normals = taken_normals(columns)
     return points_content(points, normals, _pcd_attributes(columns))
+
+
+def _check_rows(lines: list[bytes], count: int, width: int) -> None:
+    """Check that the lines of a text file are as many as its header announces, and as long.
+
+    Raises:
+        InputError: they are not.
+    """
+    found = word_counts(b"\n".join(lines), len(lines))
+    wrong = np.flatnonzero(found != width)
+    if len(wrong):
+        row = int(wrong[0])
+        raise InputError(
+            f"holds {found[row]} numbers in row {row} of its points (the first is row 0), and the "
+            f"header announces {width}"
+        )
+    if len(lines) != count:
+        early = "ends early: " if len(lines) < count else ""
+        raise InputError(f"{early}{count} points are announced, {len(lines)} follow")
 
 
 def _packed(values: FloatArray, kind: np.dtype[np.generic]) -> npt.NDArray[Any]:

@@ -101,6 +101,22 @@ def test_pcd_fields_have_names_of_their_own(fields, says, encoding, tmp_path) ->
         assert read(tmp_path / "a.pcd", header.encode() + body).points.tolist() == [[0, 1, 2]]
 
 
+@pytest.mark.parametrize(
+    ("rows", "says"),
+    [
+        (["0 0 0 1", "1 0 0 1 9"], "holds 5 numbers in row 1 .* the header announces 4"),
+        (["0 0 0", "1 0 0 1"], "holds 3 numbers in row 0"),
+        (["0 0 0 1 1 0 0 1"], "holds 8 numbers in row 0"),
+        (["0 0 0 1"], "ends early: 2 points are announced, 1 follow"),
+        (["0 0 0 1", "1 0 0 1", "2 0 0 1"], "2 points are announced, 3 follow"),
+    ],
+)
+def test_pcd_text_is_held_to_its_header(rows, says, tmp_path) -> None:
+    header = "FIELDS x y z i\nSIZE 4 4 4 4\nTYPE F F F F\nPOINTS 2\nDATA ascii\n"
+    with pytest.raises(InputError, match=says):
+        read(tmp_path / "a.pcd", header + "\n".join(rows))
+
+
 def test_pcd_packed_colours_are_whole_numbers(tmp_path) -> None:
     header = "FIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F U\nPOINTS 1\nDATA ascii\n"
     for word in ("0.5", "nan", "1e12"):
