@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +15,12 @@ from parapoint.surfaces.surface import FloatArray, IntArray
 
 BLOCK = 1 << 20
 """Units of a file, bytes or numbers of a text file, among which rows are looked for at once."""
+
+
+EXACT = 2**53
+"""The whole numbers below this one are kept as they are where text is read as floats."""
+
+logger = logging.getLogger("parapoint")
 
 
 @dataclass
@@ -93,11 +100,15 @@ def text_body(raw: bytes, first: int) -> Body:
     return Body(text, numbers(text, np.float64), lines)
 
 
-def declared(values: FloatArray, kind: np.dtype[Any]) -> npt.NDArray[Any]:
+def declared(values: npt.NDArray[Any], kind: np.dtype[Any]) -> npt.NDArray[Any]:
     """Numbers of a text file in their declared type, or as they are: some write 0.5 as uchar."""
     with np.errstate(invalid="ignore", over="ignore"):
         cast = values.astype(kind.newbyteorder("="))
-    return cast if kind.kind == "f" or (cast == values).all() else values
+    if kind.kind == "f" or values.dtype == cast.dtype:
+        return cast
+    if (np.abs(values) >= EXACT).any():
+        logger.warning("whole numbers from 2^53 on in the text are rounded; binary PLY keeps them")
+    return cast if (cast == values).all() else values
 
 
 def run_of_values(

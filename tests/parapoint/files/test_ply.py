@@ -242,3 +242,14 @@ def test_whole_numbers_of_64_bits_keep_their_value(number):
     assert table.columns["ids"].values.tolist() == [number, 5]
     for name, column in columns.items():
         assert table.columns[name].values.dtype == column.values.dtype
+
+
+@pytest.mark.parametrize(
+    ("number", "is_told"), [(2**53 - 1, False), (2**53 + 1, True), (-5, False)]
+)
+@pytest.mark.parametrize("kind", ["int64", "ulong"])
+def test_whole_numbers_of_text_that_are_rounded_are_told(number, is_told, kind, caplog):
+    elements = f"element vertex 1\n{PLACES}property {kind} id\n"
+    ids = ply.ply(ascii_ply(elements, [f"0 0 0 {number}"])).attributes["id"]
+    assert (ids.tolist() == [number]) is not is_told
+    assert ("from 2^53 on in the text are rounded" in caplog.text) is is_told
