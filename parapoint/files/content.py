@@ -94,8 +94,8 @@ def word_counts(text: bytes, line_count: int) -> IntArray:
     characters = np.frombuffer(text, dtype=np.uint8)
     blank = characters <= 32
     first = ~blank & np.concatenate([[True], blank[:-1]])
-    line = np.concatenate([[0], np.cumsum(characters == ord("\n"))[:-1]])
-    return np.bincount(line[first], minlength=line_count)
+    line = np.searchsorted(np.flatnonzero(characters == ord("\n")), np.flatnonzero(first))
+    return np.bincount(line, minlength=line_count)
 
 
 def numbers(text: bytes, kind: type[np.float64 | np.int64]) -> npt.NDArray[Any]:
