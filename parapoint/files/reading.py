@@ -366,4 +366,7 @@ def _point_cloud(content: Content, path: Path) -> PointCloud:
         logger.warning("%s: normals left out: some are not finite", path)
         normals = None
     attributes = {name: values[finite] for name, values in content.attributes.items()}
-    return PointCloud(content.vertices[finite], normals, int((~finite).sum()), attributes)
+    rows = content.rows
+    if not finite.all():
+        rows = np.flatnonzero(finite) if rows is None else rows[finite]
+    return PointCloud(content.vertices[finite], normals, int((~finite).sum()), attributes, rows)

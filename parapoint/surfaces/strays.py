@@ -94,32 +94,30 @@ def _finite(given: npt.ArrayLike) -> PointCloud:
     dropped = int((~finite).sum())
     if dropped:
         logger.warning("dropped %d of %d points: not finite", dropped, len(points))
-    return PointCloud(points[finite], dropped=dropped)
+    rows = np.flatnonzero(finite) if dropped else None
+    return PointCloud(points[finite], dropped=dropped, rows=rows)
 
 
 def without_strays(surface: Surface) -> tuple[Surface, dict[str, object]]:
     """The surface without the stray points of a cloud; their number and first rows, as facts.
 
-    A warning names them. Rows are numbered from 0.
+    A warning names their rows, numbered from 0, of the file or array that was given.
     """
     if isinstance(surface, Mesh):
         return surface, {}
     is_stray = stray_points(surface.points)
-    rows = np.flatnonzero(is_stray)
+    rows = surface.rows_of(np.flatnonzero(is_stray))
     if len(rows) == 0:
         return surface, {"strays": 0}
     logger.warning(
         "%d of %d points lie far from all others and are mapped nowhere: row%s %s",
         len(rows),
-        len(is_stray),
+        len(surface.points),
         "s" * (len(rows) > 1),
         named(rows),
     )
-    kept = ~is_stray
-    normals = None if surface.normals is None else surface.normals[kept]
-    attributes = {name: values[kept] for name, values in surface.attributes.items()}
-    cloud = PointCloud(surface.points[kept], normals, surface.dropped, attributes)
-    return cloud, {"strays": len(rows), "stray_rows": rows[:NAMED].tolist()}
+    facts = {"strays": len(rows), "stray_rows": rows[:NAMED].tolist()}
+    return surface.chosen(~is_stray), facts
 
 
 def named(rows: IntArray) -> str:

@@ -112,8 +112,7 @@ def check_together(
         InputError: it does not.
     """
     mesh = charted.mesh
-    is_mesh = isinstance(surface, Mesh)
-    points = surface.vertices[surface.referenced] if is_mesh else surface.points
+    points = surface.vertices[surface.referenced] if isinstance(surface, Mesh) else surface.points
     some = points[:: max(1, len(points) // COMPARED)]
     apart = np.sqrt(igl.point_mesh_squared_distance(some, mesh.vertices, mesh.faces)[0])
     if known is not None:
