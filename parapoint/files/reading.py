@@ -22,7 +22,7 @@ import numpy.typing as npt
 from parapoint.errors import InputError
 from parapoint.files.content import NO_UV, Content
 from parapoint.files.decoding import plain
-from parapoint.files.gltf import glb, gltf
+from parapoint.files.gltf import gltf
 from parapoint.files.las import las
 from parapoint.files.npz import npz
 from parapoint.files.obj import obj
@@ -48,7 +48,7 @@ FORMATS: dict[str, Callable[[bytes, Path], Content]] = {
     ".ply": lambda data, _: ply(data),
     ".off": lambda data, _: off(data),
     ".stl": lambda data, _: stl(data),
-    ".glb": glb,
+    ".glb": gltf,
     ".gltf": gltf,
     ".xyz": lambda data, _: xyz(data),
     ".pts": lambda data, _: pts(data),
