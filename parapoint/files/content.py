@@ -36,6 +36,7 @@ class Content:
         uv: (T, 2) texture coordinates, or None.
         uv_corners: like `corners`, rows of `uv`; NO_UV where a corner has none.
         attributes: whatever else is known at each vertex, (V,) or (V, k) by name; see `PointCloud`.
+        rows: (V,) row of each point among those of the file, where some were left out.
     """
 
     vertices: FloatArray
@@ -45,6 +46,7 @@ class Content:
     uv: FloatArray | None = None
     uv_corners: IntArray | None = None
     attributes: dict[str, npt.NDArray[Any]] = field(default_factory=dict)
+    rows: IntArray | None = None
 
 
 def points_content(

@@ -90,7 +90,9 @@ def _content(points: laspy.ScaleAwarePointRecord) -> Content:
     with np.errstate(over="ignore", invalid="ignore"):
         places = [np.asarray(points[axis], dtype=np.float64)[kept] for axis in "xyz"]
     normals = taken_normals(columns)
-    return points_content(np.stack(places, axis=1), normals, named_attributes(columns))
+    content = points_content(np.stack(places, axis=1), normals, named_attributes(columns))
+    content.rows = None if kept.all() else np.flatnonzero(kept)
+    return content
 
 
 def _warn_of_noise(kept: int, count: int) -> None:
