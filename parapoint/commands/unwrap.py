@@ -161,8 +161,10 @@ def _unwrap_mesh(given: Polygons, asked: Asked, tell: Tell) -> Facts:
         distortion=asked.distortion or Unwrap.distortion,
     )
     mesh, chosen = given.mesh, None
-    if asked.components == "largest" and mesh.component_count > 1:
-        mesh, chosen = largest_component(mesh)
+    if asked.components == "largest":
+        largest, is_part = largest_component(mesh)
+        if not is_part.all():
+            mesh, chosen = largest, is_part
     output = mesh_output(
         given,
         asked.surface,

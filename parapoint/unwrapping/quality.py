@@ -12,6 +12,7 @@ from scipy.sparse import csgraph
 from parapoint.planar.crossing import crossing_vertices
 from parapoint.surfaces.areas import LEAST_PART, STARVED
 from parapoint.surfaces.parameterization import Charted, Parameterization
+from parapoint.surfaces.preparation import first_equal, welded
 from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, flat_faces, twin_halfedges
 
 DOUBLED = 1e-6
@@ -61,12 +62,13 @@ class Quality:
 
 
 def quality(placed: Charted, texture: int) -> Quality:
-    """The quality of a map in the unit square.
+    """The quality of a map in the unit square, with vertices at one place as one.
 
     Args:
         placed: the mesh and its map; faces without area take no part but in the charts.
         texture: texels along a side of the square.
     """
+    placed = _welded(placed)
     mesh, held = placed
     solid = ~flat_faces(mesh.vertices, mesh.faces)
     space = mesh.vertices[mesh.faces[solid]]
@@ -98,6 +100,16 @@ def quality(placed: Charted, texture: int) -> Quality:
         filled=float(np.abs(signed).sum()),
         texels_per_unit=texture * float(np.sqrt(np.abs(signed).sum() / area.sum())),
     )
+
+
+def _welded(placed: Charted) -> Charted:
+    """The mesh welded, and its map with one row for all corners at one vertex and one uv."""
+    whole, held = welded(placed.mesh), placed.map
+    if np.array_equal(whole.faces, placed.mesh.faces):
+        return placed
+    uv = held.uv[held.corners.reshape(-1)]
+    row = first_equal(np.column_stack([whole.faces.reshape(-1), uv]))
+    return Charted(whole, Parameterization(uv, row.reshape(-1, 3)))
 
 
 def _overlap(held: Parameterization) -> str:

@@ -5,6 +5,9 @@ import pytest
 
 from parapoint import Mesh, Parameterization
 from parapoint.surfaces.parameterization import Charted
+from parapoint.testing import sphere
+from parapoint.textures.packing import packed
+from parapoint.unwrapping.given import mended_along
 from parapoint.unwrapping.quality import quality
 
 
@@ -135,3 +138,23 @@ def test_the_least_part_is_the_one_that_hangs_together() -> None:
         found = quality(Charted(Mesh(points, faces), Parameterization(uv, faces)), 64)
         assert found.smallest_part == pytest.approx(0.1 / kept.sum())
         assert found.starved == pytest.approx(0.1)
+
+
+def test_a_map_has_the_same_quality_however_its_vertices_are_split() -> None:
+    """A sphere that is cut open: each face, or each side of the cut, has vertices of its own."""
+    mesh = sphere()
+    charted = packed(Charted(mesh, mended_along(mesh, mesh.edges[:0])))
+    whole = quality(charted, 64)
+    assert (whole.charts, whole.overlap) == (1, "none")
+    assert whole.seam > 0.5
+    held = charted.map
+    own = np.arange(mesh.faces.size).reshape(-1, 3)
+    soup = Mesh(mesh.vertices[mesh.faces].reshape(-1, 3), own)
+    points = np.empty((len(held.uv), 3))
+    points[held.corners] = mesh.vertices[mesh.faces]
+    for split, rows in (
+        (soup, held),
+        (soup, Parameterization(held.uv[held.corners].reshape(-1, 2), own)),
+        (Mesh(points, held.corners), held),
+    ):
+        assert quality(Charted(split, rows), 64).facts() == whole.facts()

@@ -2,19 +2,21 @@
 
 import contextlib
 import json
+import math
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from parapoint import cli
+from parapoint import cli, clock
 from parapoint.commands.telling import ADVICE_OF_MESHES, warn
 from parapoint.commands.unwrapping import Request, _warn_of_bound, expected
 from parapoint.files.reading import read_parameterized, read_surface
 from parapoint.surfaces.areas import LEAST_PART, MOST_STARVED
 from parapoint.surfaces.surface import Mesh
-from parapoint.testing import irregular_disk
+from parapoint.testing import irregular_disk, sphere
 from parapoint.unwrapping import unwrap
+from parapoint.unwrapping.given import mended_along
 from parapoint.unwrapping.unwrap import Unwrap
 
 BOX = """# a box of quads
@@ -110,6 +112,60 @@ def test_a_seam_through_a_polygon_makes_it_triangles_and_says_so(
     assert (tmp_path / "out.obj").read_text().count("\nf ") == 7
 
 
+def soup(path) -> None:
+    """Write a sphere whose faces have three vertices each of their own."""
+    ball = sphere()
+    lines = [f"v {x} {y} {z}" for x, y, z in ball.vertices[ball.faces].reshape(-1, 3)]
+    lines += [f"f {k} {k + 1} {k + 2}" for k in range(1, ball.faces.size, 3)]
+    path.write_text("\n".join(lines))
+
+
+def test_seams_join_the_vertices_that_lie_at_one_place(tmp_path, capsys) -> None:
+    """Each end of an edge is named by another of the vertices there than a face of it has."""
+    soup(tmp_path / "soup.obj")
+    ball = sphere()
+    last = {vertex: k + 1 for k, vertex in enumerate(ball.faces.reshape(-1).tolist())}
+    a, b = ball.edges[0].tolist()
+    c = next(of for of in ball.edges.tolist() if b == of[0] and a not in of)[1]
+    (tmp_path / "seams.txt").write_text(f"{last[a]} {last[b]}\n{last[b]} {last[c]}\n")
+    arguments = ["unwrap", tmp_path / "soup.obj", "--out", tmp_path / "out.obj", "--json"]
+    status, out, _ = run([*arguments, "--seams", tmp_path / "seams.txt"], capsys)
+    assert status == 0
+    facts = json.loads(out)
+    assert (facts["charts"], facts["components"], facts["overlap"]) == (1, 1, "none")
+    ends = ball.vertices[[a, b, c]]
+    length = np.linalg.norm(np.diff(ends, axis=0), axis=1).sum()
+    assert facts["seam"] == pytest.approx(length / np.sqrt(ball.face_areas.sum()), rel=1e-3)
+    vertices = [
+        line for line in (tmp_path / "out.obj").read_text().splitlines() if line[:2] == "v "
+    ]
+    assert vertices == (tmp_path / "soup.obj").read_text().splitlines()[: len(vertices)]
+
+
+def test_the_largest_component_is_found_across_split_vertices(tmp_path, capsys) -> None:
+    """A square of two triangles, each with its own vertices, and a triangle apart."""
+    corners = [(0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1), (5, 5), (6, 5), (5, 6)]
+    lines = [f"v {x} {y} 0" for x, y in corners] + ["f 1 2 3", "f 4 5 6", "f 7 8 9"]
+    (tmp_path / "square.obj").write_text("\n".join(lines))
+    arguments = ["unwrap", tmp_path / "square.obj", "--out", tmp_path / "out.obj", "--json"]
+    _, out, _ = run([*arguments, "--components", "largest"], capsys)
+    facts = json.loads(out)
+    assert [facts[name] for name in ("faces", "charts", "components", "seam")] == [2, 1, 1, 0]
+
+
+def test_seams_share_the_clock_of_the_time_budget(box, tmp_path, capsys, monkeypatch) -> None:
+    deadlines = []
+
+    def noted(mesh, seams, deadline):
+        deadlines.append(deadline - clock.worked())
+        return mended_along(mesh, seams, deadline)
+
+    monkeypatch.setattr("parapoint.commands.unwrapping.mended_along", noted)
+    for more in ([], ["--time-budget", 50]):
+        assert unfold(box, tmp_path / "out.obj", capsys, *more)[0] == 0
+    assert deadlines == [math.inf, pytest.approx(50, abs=1)]
+
+
 def test_other_formats_and_one_uv_a_vertex(box, tmp_path, capsys, caplog) -> None:
     unfold(box, tmp_path / "out.npz", capsys)
     assert "left out: old UVs, polygons. A .obj file would keep them" in caplog.text
@@ -128,6 +184,8 @@ def test_other_formats_and_one_uv_a_vertex(box, tmp_path, capsys, caplog) -> Non
     ("seams", "more", "message"),
     [
         ("1 7\n", [], "line 1 is no edge of the mesh"),
+        ("1 2\n0 1\n", [], "line 2 is no edge of the mesh"),
+        ("2 99\n", [], "line 1 is no edge of the mesh"),
         ("1 2 3\n", [], "line 1 is not two vertex numbers"),
         ("# none\n", [], "has no edge"),
         (NET, ["--max-distortion", "4.1"], "--max-distortion does not go with --seams"),
@@ -142,6 +200,7 @@ def test_wrong_use_is_one_line(seams, more, message, box, capsys) -> None:
     assert (status, out) == (2, "")
     assert message in err
     assert err.count("\n") == 1
+    assert "--seams" in err or err.count(str(box.parent)) <= 1
     assert not target.exists()
 
 
