@@ -14,9 +14,12 @@ from parapoint.surfaces.areas import LEAST_PART, STARVED
 from parapoint.surfaces.parameterization import Charted, Parameterization
 from parapoint.surfaces.preparation import first_equal, welded
 from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, flat_faces, twin_halfedges
+from parapoint.textures.texels import texels
 
 DOUBLED = 1e-6
 """Share of a map's area that may be covered twice by rounding alone."""
+FINE = 512
+"""Texels along a side of the grid on which we count what a map fills whose faces overlap."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +39,7 @@ class Quality:
             over or an edge has more than two.
         charts: pieces of the map.
         seam: length of the cut over sqrt(area).
-        filled: share of the unit square that the map fills.
+        filled: share of the unit square that the map fills; what lies twice counts once.
         texels_per_unit: of a texture, along a length of 1 of the mesh, at the mean scale.
     """
 
@@ -86,6 +89,10 @@ def quality(placed: Charted, texture: int) -> Quality:
     whole = np.zeros((2, len(mesh.faces)))
     whole[:, solid] = share, ratio * share
     flipped = int((signed <= 0).sum())
+    overlap = "unknown" if flipped else _overlap(held)
+    filled = float(np.abs(signed).sum())
+    if overlap != "none":
+        filled = texels(placed, FINE).inside.sum() / FINE**2
     return Quality(
         angle_mean=float(share @ angles.mean(axis=1)),
         angle_worst=float(angles.max()),
@@ -94,10 +101,10 @@ def quality(placed: Charted, texture: int) -> Quality:
         smallest_part=_smallest_part(placed, starved, *whole),
         starved=float(share[ratio < STARVED].sum()),
         flipped=flipped,
-        overlap="unknown" if flipped else _overlap(held),
+        overlap=overlap,
         charts=int(held.charts().max()) + 1,
         seam=cut / float(np.sqrt(area.sum())),
-        filled=float(np.abs(signed).sum()),
+        filled=filled,
         texels_per_unit=texture * float(np.sqrt(np.abs(signed).sum() / area.sum())),
     )
 

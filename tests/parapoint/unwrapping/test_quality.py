@@ -158,3 +158,15 @@ def test_a_map_has_the_same_quality_however_its_vertices_are_split() -> None:
         (Mesh(points, held.corners), held),
     ):
         assert quality(Charted(split, rows), 64).facts() == whole.facts()
+
+
+@pytest.mark.parametrize("turn", [1, -1])
+def test_what_faces_fill_together_counts_once(turn) -> None:
+    """Half of the square twice, the second time perhaps turned over; and a quarter beside it."""
+    half, quarter = [[0, 1, 2], [0, 2, 3]], [[1, 4, 5], [1, 5, 6]]
+    uv = [[0.0, 0], [0.5, 0], [0.5, 1], [0, 1], [1, 0], [1, 0.5], [0.5, 0.5]]
+    faces = np.array([*half, *(np.array(half)[:, ::turn]), *quarter])
+    mesh = Mesh(np.pad(uv, ((0, 0), (0, 1))), faces)
+    found = quality(Charted(mesh, Parameterization(uv, faces)), 64)
+    assert found.overlap == "unknown"
+    assert found.filled == pytest.approx(0.75, rel=1e-3)
