@@ -7,10 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from parapoint.commands.output import SIDES, TEXTURE
 from parapoint.commands.progress import Tell, baking, untold
+from parapoint.files.gltf import opened
 from parapoint.files.gltf_rewriting import check_rewritable, rewrite_gltf
 from parapoint.files.mesh_writers import (
     write_material,
@@ -22,11 +21,10 @@ from parapoint.files.mesh_writers import (
 from parapoint.files.obj_rewriting import libraries, rewrite_obj, write_library
 from parapoint.files.painting import Painting, Picture, painting_of
 from parapoint.files.ply_rewriting import has_strips, rewrite_ply
-from parapoint.files.point_writers import write_points
 from parapoint.files.reading import Polygons, faults_of
 from parapoint.files.targets import checked_target
 from parapoint.surfaces.parameterization import Charted
-from parapoint.surfaces.surface import BoolArray, FloatArray, PointCloud
+from parapoint.surfaces.surface import BoolArray
 from parapoint.textures.baking import LARGEST
 from parapoint.textures.checkerboard import checkerboard
 from parapoint.textures.repainting import coloured, repainted
@@ -35,6 +33,8 @@ logger = logging.getLogger("parapoint")
 
 REWRITTEN = {(".obj", ".obj"), (".ply", ".ply"), (".glb", ".glb"), (".gltf", ".glb")}
 """Endings of an input and an output between which all but the UVs is kept."""
+WITHOUT_STRAYS = (".ply", ".glb")
+"""Endings of files that are written with the vertices of faces alone."""
 CHECKER_FIELDS = 32
 """Fields along a side of the checkerboard."""
 
@@ -52,7 +52,6 @@ class MeshOutput:
         asked: whether a texture was asked for.
         painting: what the file paints on its triangles, or None.
         chosen: (F,) the triangles that are written, or None for all.
-        per_vertex: whether each vertex is to have one uv.
     """
 
     given: Polygons
@@ -63,13 +62,12 @@ class MeshOutput:
     asked: bool
     painting: Painting | None
     chosen: BoolArray | None = None
-    per_vertex: bool = False
 
     @property
     def is_rewritten(self) -> bool:
         """Whether the file is copied with new UVs, and all else stays."""
         pair = (self.source.suffix.lower(), self.out.suffix.lower())
-        if pair not in REWRITTEN or self.chosen is not None or self.per_vertex:
+        if pair not in REWRITTEN or self.chosen is not None:
             return False
         return pair[0] != ".ply" or not has_strips(self.source)
 
@@ -77,7 +75,7 @@ class MeshOutput:
     def has_picture(self) -> bool:
         """Whether a picture is written beside the file."""
         ending = self.out.suffix.lower()
-        if self.per_vertex or ending not in SIDES:
+        if ending not in SIDES:
             return False
         if self.is_rewritten and ending == ".obj":
             return self.shows_old or not libraries(self.source)[0]
@@ -100,6 +98,16 @@ class MeshOutput:
         if self.is_rewritten and self.out.suffix.lower() == ".glb":
             with faults_of(self.source):
                 check_rewritable(self.source)
+        if self.asked and not self._gets_texture:
+            why = "its own materials stay" if self.is_rewritten else "this format has none"
+            logger.warning("%s: no texture is written: %s", self.out, why)
+
+    @property
+    def _gets_texture(self) -> bool:
+        """Whether a texture of ours is written, beside the file or inside."""
+        if self.out.suffix.lower() != ".glb":
+            return self.has_picture
+        return not (self.is_rewritten and opened(self.source).tree.get("materials"))
 
     def picture(self, placed: Charted, tell: Tell = untold) -> Picture:
         """What the texture shows: what the file does, or a checkerboard."""
@@ -113,9 +121,6 @@ class MeshOutput:
 
     def write(self, placed: Charted, picture: Picture) -> dict[str, object]:
         """Write the mesh with its map in the unit square; facts of the writing."""
-        if self.per_vertex:
-            write_points(self.out, PointCloud(placed.mesh.vertices), _one_each(placed))
-            return {}
         if self.is_rewritten:
             rewrite: dict[str, Callable[[Charted, Picture], dict[str, object]]] = {
                 ".obj": self._rewrite_obj,
@@ -175,13 +180,14 @@ class MeshOutput:
     @property
     def _keeper(self) -> str:
         """The ending of a file that would keep all but the UVs; "" for none."""
-        is_whole = self.chosen is None and not self.per_vertex
         own = self.source.suffix.lower()
-        return next((out for given, out in REWRITTEN if given == own and is_whole), "")
+        return next((out for given, out in REWRITTEN if given == own and self.chosen is None), "")
 
     def _warn_of_extras(self) -> None:
         shown = {"old UVs", "colours"} if self.painting is not None else {"colours"}
         left = [name for name in self.given.extras if name not in shown]
+        if self.out.suffix.lower() in WITHOUT_STRAYS and not self.given.mesh.referenced.all():
+            left.append("vertices without faces")
         if left:
             logger.warning(
                 "%s: positions, triangles, new UVs and colours are written; left out: %s%s",
@@ -199,7 +205,6 @@ def mesh_output(
     margin: int,
     *,
     chosen: BoolArray | None = None,
-    per_vertex: bool = False,
 ) -> MeshOutput:
     """What is to be written of a mesh; its texture is no coarser than the pictures that it shows.
 
@@ -218,12 +223,4 @@ def mesh_output(
         texture is not None,
         painting,
         chosen,
-        per_vertex,
     )
-
-
-def _one_each(placed: Charted) -> FloatArray:
-    """(V, 2) one of the uvs of each vertex; of a vertex without faces the middle."""
-    uv = np.full((len(placed.mesh.vertices), 2), 0.5)
-    uv[placed.mesh.faces[::-1]] = placed.map.uv[placed.map.corners[::-1]]
-    return uv

@@ -172,11 +172,17 @@ def _unwrap_mesh(given: Polygons, asked: Asked, tell: Tell) -> Facts:
         asked.texture,
         MARGIN if asked.margin is None else asked.margin,
         chosen=chosen,
-        per_vertex=asked.per_vertex,
     )
     output.check(force=asked.force)
     border = BORDER if asked.margin is None else asked.margin / (asked.texture or TEXTURE)
-    request = Request(method, border, asked.seed, asked.seams, asked.preview)
+    request = Request(
+        method,
+        border,
+        asked.seed,
+        asked.seams,
+        asked.preview,
+        per_vertex=asked.per_vertex,
+    )
     return unwrap_mesh(mesh, request, output, tell)
 
 

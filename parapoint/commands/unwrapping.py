@@ -47,6 +47,7 @@ class Request:
         seed: of every random draw.
         seams: file of the edges to cut along, or None for seams of the method's own.
         preview: a PNG file for a picture of the surface beside its layout, or None.
+        per_vertex: whether each vertex gets one uv, whatever the seams.
     """
 
     method: Unwrap
@@ -54,6 +55,7 @@ class Request:
     seed: int = 0
     seams: str | None = None
     preview: Path | None = None
+    per_vertex: bool = False
 
 
 def unwrap_mesh(
@@ -80,6 +82,8 @@ def unwrap_mesh(
     tell(Progress("packing"))
     placed = packed(Charted(mesh, made), request.border)
     picture = output.picture(placed, tell)
+    if request.per_vertex:
+        placed = _one_each(placed)
     tell(Progress("writing"))
     written = output.write(placed, picture)
     if request.preview is not None:
@@ -96,8 +100,32 @@ def unwrap_mesh(
     facts |= written
     facts["seconds"] = round(time.perf_counter() - began, 1)
     _warn_of_bound(facts, request)
-    warn(facts, ADVICE_OF_MESHES)
+    if request.per_vertex:
+        del facts["energy"]  # of the map along its seams, which is not written
+    warn(facts, _advice(request))
     return facts
+
+
+def _one_each(placed: Charted) -> Charted:
+    """The mesh with one of the uvs of each vertex; of a vertex without faces the middle."""
+    mesh, held = placed
+    uv = np.full((len(mesh.vertices), 2), 0.5)
+    uv[mesh.faces[::-1]] = held.uv[held.corners[::-1]]
+    return Charted(mesh, Parameterization(uv, mesh.faces))
+
+
+def _advice(request: Request) -> dict[str, str]:
+    """What helps where faces overlap, and where parts are starved, as the map was asked for."""
+    advice = dict(ADVICE_OF_MESHES)
+    if request.per_vertex:
+        advice |= {"overlap": "with --per-vertex, faces across a seam span the map"}
+    if request.seams is not None:
+        advice |= {"starved": "a longer seam helps"}
+    elif request.method.max_distortion is not None:
+        advice |= {"starved": "a longer seam helps, as with a lower --max-distortion"}
+    elif request.method.distortion == "conformal":
+        advice |= {"starved": "--distortion balanced helps, or isometric"}
+    return advice
 
 
 def expected(method: Unwrap, faces: int) -> float | None:

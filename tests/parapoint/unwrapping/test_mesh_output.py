@@ -10,7 +10,8 @@ from numpy.testing import assert_allclose
 from PIL import Image
 
 from parapoint import InputError, Mesh, Parameterization
-from parapoint.commands.mesh_output import _one_each, mesh_output
+from parapoint.commands.mesh_output import mesh_output
+from parapoint.commands.unwrapping import _one_each
 from parapoint.files.gltf import opened
 from parapoint.files.mesh_writers import write_glb, write_ply
 from parapoint.files.painting import painting_of
@@ -423,4 +424,4 @@ def test_of_the_uvs_of_a_vertex_one_is_chosen_and_without_any_the_middle() -> No
     placed = Charted(
         Mesh(points, [[0, 1, 2], [0, 2, 3]]), Parameterization(uv, [[0, 1, 2], [3, 4, 5]])
     )
-    assert_allclose(_one_each(placed), [*uv[:3], uv[5], [0.5, 0.5]])
+    assert_allclose(_one_each(placed).map.uv, [*uv[:3], uv[5], [0.5, 0.5]])

@@ -10,13 +10,15 @@ from PIL import Image
 
 from parapoint import cli, clock
 from parapoint.commands.telling import ADVICE_OF_MESHES, warn
-from parapoint.commands.unwrapping import Request, _warn_of_bound, expected
+from parapoint.commands.unwrapping import Request, _advice, _warn_of_bound, expected
 from parapoint.files.reading import read_parameterized, read_surface
 from parapoint.surfaces.areas import LEAST_PART, MOST_STARVED
+from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.surface import Mesh
 from parapoint.testing import irregular_disk, sphere
 from parapoint.unwrapping import unwrap
 from parapoint.unwrapping.given import mended_along
+from parapoint.unwrapping.quality import quality
 from parapoint.unwrapping.unwrap import Unwrap
 
 BOX = """# a box of quads
@@ -166,16 +168,48 @@ def test_seams_share_the_clock_of_the_time_budget(box, tmp_path, capsys, monkeyp
     assert deadlines == [math.inf, pytest.approx(50, abs=1)]
 
 
-def test_other_formats_and_one_uv_a_vertex(box, tmp_path, capsys, caplog) -> None:
+@pytest.mark.parametrize("ending", ["obj", "ply", "glb", "npz"])
+def test_each_vertex_gets_one_uv_and_faces_and_figures_are_of_that(
+    ending, tmp_path, capsys, caplog
+) -> None:
+    """A tetrahedron is cut to a net of its four faces; two of them cannot keep their places."""
+    (tmp_path / "four.off").write_text(
+        "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"
+    )
+    (tmp_path / "net.txt").write_text("1 2\n1 3\n1 4\n")
+    out = tmp_path / f"new.{ending}"
+    arguments = ["unwrap", tmp_path / "four.off", "--seams", tmp_path / "net.txt", "--out", out]
+    status, said, _ = run([*arguments, "--per-vertex", "--texture", 64, "--json"], capsys)
+    facts = json.loads(said)
+    assert (status, facts["seam"], "energy" in facts) == (0, 0, False)
+    assert facts["overlap"] == "unknown"
+    assert "with --per-vertex, faces across a seam span the map" in caplog.text
+    mesh, held = read_parameterized(out)
+    assert len(mesh.vertices) == len(np.unique(held.corners)) == 4
+    assert np.array_equal(held.corners, mesh.faces)
+    found = quality(Charted(mesh, held), 64).facts()
+    for name in ("angle_mean", "angle_worst", "stretch_worst", "flipped", "filled"):
+        assert facts[name] == pytest.approx(found[name], rel=1e-3)
+    if ending == "npz":
+        assert "no texture is written: this format has none" in caplog.text
+    elif ending != "glb":
+        with Image.open(tmp_path / "new.png") as picture:
+            assert picture.size == (64, 64)
+
+
+def test_a_texture_that_an_obj_file_has_no_use_for_is_said(box, tmp_path, capsys, caplog) -> None:
+    unfold(box, tmp_path / "out.obj", capsys, "--texture", 64)
+    assert "no texture is written: its own materials stay" in caplog.text
+    assert not (tmp_path / "out.png").exists()
+
+
+def test_other_formats(box, tmp_path, capsys, caplog) -> None:
     unfold(box, tmp_path / "out.npz", capsys)
     assert "left out: old UVs, polygons. A .obj file would keep them" in caplog.text
     with np.load(tmp_path / "out.npz") as held:
         assert held["vertices"].shape == (8, 3)
         assert held["uv"].shape == (14, 2)
         assert held["corners"].shape == held["faces"].shape == (12, 3)
-    unfold(box, tmp_path / "one.npz", capsys, "--per-vertex")
-    with np.load(tmp_path / "one.npz") as held:
-        assert held["uv"].shape == (8, 2)
     unfold(box, tmp_path / "out.glb", capsys)
     assert len(read_surface(tmp_path / "out.glb").faces) == 12
 
@@ -242,6 +276,21 @@ def test_a_picture_of_a_mesh_is_opaque_and_upright(name, is_y_up, box, capsys, m
     status, *_ = run([*arguments, "--preview", folder / "seen.png"], capsys)
     assert status == 0
     assert seen == [(3, is_y_up)]
+
+
+@pytest.mark.parametrize(
+    ("asked", "word"),
+    [
+        (Request(Unwrap(), 0.0), "--seam-price"),
+        (Request(Unwrap(), 0.0, seams="net.txt"), "a longer seam helps"),
+        (Request(Unwrap(max_distortion=4.1), 0.0), "--max-distortion"),
+        (Request(Unwrap(distortion="conformal"), 0.0), "--distortion balanced"),
+    ],
+)
+def test_no_advice_names_an_option_that_is_excluded(asked, word) -> None:
+    advice = _advice(asked)["starved"]
+    assert word in advice
+    assert ("--seam-price" in advice) == (word == "--seam-price")
 
 
 @pytest.mark.parametrize("more", [0.0, 1e-4])
