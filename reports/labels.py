@@ -172,7 +172,7 @@ def labels(rows: Iterable[ResultRow]) -> dict[tuple[str, str], Label]:
     for key in keys:
         method = key[0]
         name, fixed = in_print[key]
-        siblings = [params[other] for other in keys if in_print[other] == in_print[key] != key]
+        siblings = [params[other] for other in keys if in_print[other] == in_print[key]]
         differing = [
             entry
             for entry, value in params[key].items()

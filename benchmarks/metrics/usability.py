@@ -148,8 +148,6 @@ def _lines(edges: IntArray) -> list[list[int]]:
         while len(around[line[-1]]) == 2 and line[-1] != start:
             a, b = around[line[-1]]
             step = b if a == line[-2] else a
-            if (line[-1], step) in walked:
-                break
             walked.update([(line[-1], step), (step, line[-1])])
             line.append(step)
         return line

@@ -77,8 +77,9 @@ def scores(
         elif len(some) > 1:  # one of them spoilt it for the others
             alone.extend(task([row]) for row in some)
         else:
-            values[some[0].id] = {}
-            reasons[some[0].id] = outcome.reason or "its metrics were lost"
+            (row,) = some
+            values[row.id] = {}
+            reasons[row.id] = outcome.reason or "its metrics were lost"
         told(len(values), len(rows))
 
     surfaces: dict[str, list[ResultRow]] = {}

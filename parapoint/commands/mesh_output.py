@@ -11,6 +11,7 @@ from parapoint.commands.output import SIDES, TEXTURE
 from parapoint.commands.progress import Tell, baking, untold
 from parapoint.files.gltf import opened
 from parapoint.files.gltf_rewriting import check_rewritable, rewrite_gltf
+from parapoint.files.materials import libraries
 from parapoint.files.mesh_writers import (
     write_material,
     write_npz,
@@ -18,7 +19,7 @@ from parapoint.files.mesh_writers import (
     write_ply,
     write_textured,
 )
-from parapoint.files.obj_rewriting import libraries, rewrite_obj, write_library
+from parapoint.files.obj_rewriting import rewrite_obj, write_library
 from parapoint.files.painting import Painting, Picture, painting_of
 from parapoint.files.ply_rewriting import has_strips, rewrite_ply
 from parapoint.files.reading import Polygons, faults_of

@@ -2,36 +2,69 @@
 
 from __future__ import annotations
 
+import logging
 import re
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from parapoint.errors import InputError
+from parapoint.files.attributes import COLOUR_COLUMNS, named_attributes
 from parapoint.files.content import NO_UV, Content, numbers, plain_numbers, word_counts
 from parapoint.surfaces.surface import FloatArray, IntArray
 
-V, VT, F = (b"v ", b"v\t"), (b"vt ", b"vt\t"), (b"f ", b"f\t")
+V, VT, VN = (b"v ", b"v\t"), (b"vt ", b"vt\t"), (b"vn ", b"vn\t")
+F = (b"f ", b"f\t")
 FO = (b"fo ", b"fo\t")
-FREE_FORM = (b"surf ", b"surf\t", b"curv ", b"curv\t", b"curv2 ", b"curv2\t")
+NO_SURFACE = tuple(
+    word + blank for word in (b"l", b"surf", b"curv", b"curv2") for blank in (b" ", b"\t")
+)
 """Beginnings of the lines that are read."""
+CONTINUED = re.compile(
+    rb"\\[ \t]*(?:#[^\r\n]*)?(?:\r\n|\r|\n|\Z)([ \t]*(?:v[tnp]?|fo?|l|p|usemtl|mtllib)[ \t])?"
+    rb"|#[^\r\n]*"
+)
+"""A backslash at the end of a line, and the word behind it where no line goes on; a comment."""
+
+logger = logging.getLogger("parapoint")
+
+
+def obj_lines(data: bytes) -> list[bytes]:
+    """The lines of an OBJ file or a material library; those that go on after a backslash are one.
+
+    No comment goes on, though it may end in a backslash.
+    """
+    if b"\\" in data:
+        data = CONTINUED.sub(_joined, data)
+    return data.splitlines()
+
+
+def _joined(found: re.Match[bytes]) -> bytes:
+    """What takes the place of a match of CONTINUED."""
+    if found[0].startswith(b"#"):
+        return found[0]
+    return b" " if found[1] is None else b"\n" + found[1]
 
 
 def obj(data: bytes) -> Content:
-    """Wavefront OBJ: v, vt, f, fo; negative indices, polygons, UV on some corners or all."""
-    text = plain_numbers(data)
-    text = re.sub(rb"#[^\r\n]*", b"", text) if b"#" in text else text
-    lines = [
-        line.strip() for line in text.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines()
-    ]
+    """Wavefront OBJ: v, vt, f, fo; negative indices, polygons, UV on some corners or all.
+
+    Colours behind the coordinates are attributes; vn lines are normals where there is no face.
+    """
+    lines = [line.split(b"#", 1)[0].strip() for line in obj_lines(plain_numbers(data))]
     # "fo" is what faces with a border were called before 1993; they are faces as others.
     lines = [b"f" + line[2:] if line.startswith(FO) else line for line in lines]
-    if any(line.startswith(FREE_FORM) for line in lines) and not any(
-        line.startswith(F) for line in lines
-    ):
-        raise InputError("holds curves or free-form surfaces and no face; export it as a mesh")
+    has_faces = any(line.startswith(F) for line in lines)
+    if not has_faces and any(line.startswith(NO_SURFACE) for line in lines):
+        raise InputError(
+            "holds lines, curves or free-form surfaces and no face; export it as a mesh"
+        )
     points, point_sizes = _rows([line[1:] for line in lines if line.startswith(V)])
+    if not len(point_sizes):
+        raise InputError(f"has no point: {_why_pointless(data)}")
     uvs, uv_sizes = _rows([line[2:] for line in lines if line.startswith(VT)])
-    if len(point_sizes) and point_sizes.min() < 3:
+    if point_sizes.min() < 3:
         raise InputError("a v line has fewer than three coordinates")
     if len(uv_sizes) and uv_sizes.min() < 1:
         raise InputError("a vt line has no coordinate")
@@ -45,7 +78,10 @@ def obj(data: bytes) -> Content:
             before = np.repeat(seen, sizes)
             backwards = indices < 0
             indices[backwards] = np.maximum(before[backwards] + indices[backwards] + 1, -1)
-    content = Content(vertices, sizes, corners - 1)
+    content = Content(vertices, sizes, corners - 1, attributes=_colours(points, point_sizes))
+    if not has_faces:
+        normals = [line[2:] for line in lines if line.startswith(VN)]
+        content.normals = _normals(normals, len(vertices))
     if len(uv_sizes):
         starts = np.cumsum(uv_sizes) - uv_sizes
         second = np.where(uv_sizes > 1, starts + 1, starts)
@@ -54,6 +90,39 @@ def obj(data: bytes) -> Content:
     elif uv_corners.any():
         raise InputError("faces refer to texture coordinates, but the file has no vt line")
     return content
+
+
+def _why_pointless(data: bytes) -> str:
+    """Why no line of a file is a v line, as far as its first lines show it."""
+    if b"\0" in data[:2]:
+        return "it looks like UTF-16 without a byte order mark; save it in UTF-8"
+    if re.search(rb"(?:^|[\r\n])[ \t]*V[ \t]", data):
+        return "its keywords are in upper case; write v, vt and f"
+    first = data.split(None, 1)[0][:20].decode("latin-1")
+    return f"no line begins with v; the file begins with {first!r}. Is it an OBJ file?"
+
+
+def _colours(points: FloatArray, sizes: IntArray) -> dict[str, npt.NDArray[Any]]:
+    """What stands behind the coordinates of all v lines: r g b or r g b a; a weight is left."""
+    if (sizes < 6).all():
+        return {}
+    width = int(sizes[0])
+    if width > 7 or (sizes != width).any():
+        logger.warning("colours of vertices are left out: not all v lines hold x y z r g b")
+        return {}
+    columns = points.reshape(-1, width)[:, 3:].T
+    return named_attributes(dict(zip(COLOUR_COLUMNS[0], columns, strict=False)))
+
+
+def _normals(lines: list[bytes], count: int) -> FloatArray | None:
+    """(count, 3) normals of points, where there is one for each; None where there is none."""
+    normals, sizes = _rows(lines)
+    if not len(sizes):
+        return None
+    if len(sizes) != count or (sizes != 3).any():
+        logger.warning("normals are left out: not each of %d points has a vn line x y z", count)
+        return None
+    return normals.reshape(-1, 3)
 
 
 def _obj_faces(lines: list[bytes]) -> tuple[IntArray, IntArray, IntArray]:

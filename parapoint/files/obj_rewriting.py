@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import logging
 import os
-import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,26 +11,15 @@ import numpy as np
 import numpy.typing as npt
 
 from parapoint.files.decoding import plain
+from parapoint.files.materials import OF_PICTURE, library_lines, named_libraries
 from parapoint.files.mesh_writers import write_picture
+from parapoint.files.obj import obj_lines
 from parapoint.files.polygons import corner_rows
 from parapoint.files.targets import beside, complete_file, sealed_text
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import IntArray
 
-OF_PICTURE = re.compile(r"^\s*(map_\w+|bump|disp|decal|norm|refl)\b", re.IGNORECASE)
-"""The word that begins a line of a material library which names a picture."""
-
 logger = logging.getLogger("parapoint")
-
-
-def libraries(source: Path) -> tuple[list[Path], bool]:
-    """The material libraries that an OBJ file names, and whether one of them names a picture."""
-    found: list[Path] = []
-    for line in _lines(plain(source.read_bytes())):
-        words = line.split(None, 1)
-        if len(words) == 2 and words[0] == b"mtllib":
-            found.append(source.parent / words[1].strip().decode(errors="surrogateescape"))
-    return found, any(OF_PICTURE.match(line) for path in found for line in _library_lines(path))
 
 
 def write_library(out: Path, texture: npt.NDArray[Any] | None, given: list[Path]) -> str:
@@ -47,7 +34,7 @@ def write_library(out: Path, texture: npt.NDArray[Any] | None, given: list[Path]
     library = beside(out, ".mtl")
     image = "" if texture is None else write_picture(out, texture).name
     kept, left = [], set()
-    for line in (line for path in given for line in _library_lines(path)):
+    for line in (line for path in given for line in library_lines(path)):
         word = OF_PICTURE.match(line)
         if word is None:
             kept.append(line)
@@ -64,11 +51,6 @@ def write_library(out: Path, texture: npt.NDArray[Any] | None, given: list[Path]
     with complete_file(library) as file:
         file.write(sealed_text("".join(f"{line}\n" for line in kept)))
     return f"mtllib {library.name}\n"
-
-
-def _library_lines(path: Path) -> list[str]:
-    """The lines of a material library; none where the file is missing."""
-    return path.read_bytes().decode(errors="replace").splitlines() if path.is_file() else []
 
 
 def rewrite_obj(
@@ -105,17 +87,19 @@ def rewrite_obj(
     uv_lines = "".join(f"vt {u!r} {v!r}\n" for u, v in parameterization.uv.tolist()).encode()
     place = split = 0
     began = False
-    for line in _lines(plain(source.read_bytes())):
+    for line in obj_lines(plain(source.read_bytes())):
         words = line.split(b"#", 1)[0].split()
         kind = words[0] if words else b""
         if kind == b"vt":
             continue
         if kind == b"mtllib":
             if keeps_libraries:
-                made.append(_from_folder(line, source, out))
+                made += _from_folder(line, source, out)
         elif kind == b"l":
             made.append(b" ".join([kind, *(word.split(b"/")[0] for word in words[1:])]) + b"\n")
         elif kind in {b"f", b"fo"}:
+            if len(words) == 1:
+                continue
             if not began:
                 made.append(uv_lines)
                 began = True
@@ -148,13 +132,8 @@ def _face(corners: list[tuple[bytes, int]]) -> bytes:
     return b"f " + b" ".join(words) + b"\n"
 
 
-def _from_folder(line: bytes, source: Path, out: Path) -> bytes:
-    """A mtllib line that names the same file as seen from the folder of `out`."""
-    name = line.split(None, 1)[1].strip().decode(errors="surrogateescape")
-    path = os.path.relpath(source.parent.resolve() / name, out.parent.resolve())
-    return b"mtllib " + path.encode(errors="surrogateescape") + b"\n"
-
-
-def _lines(data: bytes) -> Iterator[bytes]:
-    """Lines without their ends; those that go on after a backslash are joined."""
-    yield from re.sub(rb"\\\r?\n", b" ", data).splitlines()
+def _from_folder(line: bytes, source: Path, out: Path) -> list[bytes]:
+    """Lines that name the libraries of a mtllib line as seen from the folder of `out`."""
+    found = named_libraries(source.parent.resolve(), line.split(None, 1)[1])
+    paths = (os.path.relpath(path, out.parent.resolve()) for path in found)
+    return [b"mtllib " + path.encode(errors="surrogateescape") + b"\n" for path in paths]

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import logging
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,19 +13,15 @@ import numpy as np
 import numpy.typing as npt
 
 from parapoint.errors import InputError
-from parapoint.files.decoding import plain
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray
 
 MOST_TEXELS = 16_384
 """Texels along a side of a picture that is read."""
-OPTION = re.compile(
-    r"-(?:(?:mm|[ost])(?:\s+[-+.\deE]+)+|(?:blendu|blendv|bm|boost|cc|clamp|imfchan|texres|type)"
-    r"\s+\S+)\s+"
-)
-"""An option of a picture in a material library (Wavefront's specification)."""
 WHITE = (255, 255, 255)
 
 Picture = npt.NDArray[np.uint8]
+
+logger = logging.getLogger("parapoint")
 
 
 @dataclass(frozen=True)
@@ -83,60 +81,38 @@ def read_picture(data: bytes | Path) -> Picture:
         raise InputError(f"{name}is no picture that can be read ({error})") from None
 
 
-def materials_of(libraries: list[Path]) -> dict[str, Material]:
-    """The materials in Wavefront material libraries, by name; missing files are passed over.
+def named_file(folder: Path, written: str) -> Path | None:
+    """The file that another one in `folder` names; None where there is none.
 
-    A picture that is missing or cannot be read leaves its material in its colour.
+    It is looked for as it is written and as a bare name, with any kind of slashes, in upper and
+    lower case, and in `folder` itself at last.
     """
-    found: dict[str, Material] = {}
-    for library in libraries:
-        if not library.is_file():
-            continue
-        name = ""
-        for line in plain(library.read_bytes()).decode(errors="surrogateescape").splitlines():
-            kind, _, rest = line.strip().partition(" ")
-            rest = rest.strip()
-            if kind == "newmtl":
-                name = rest
-                found[name] = Material()
-            elif kind == "Kd" and name:
-                found[name] = Material(_eight_bits(rest), found[name].picture)
-            elif kind.lower() == "map_kd" and name:
-                while (option := OPTION.match(rest)) is not None:
-                    rest = rest[option.end() :]
-                path = library.parent / rest.replace("\\", "/")
-                if path.is_file():
-                    found[name] = Material(found[name].colour, read_picture(path))
-    return found
+    with suppress(OSError):  # a name that is too long, a folder that may not be read
+        for name in (written.strip(), bare_name(written)):
+            path = Path(folder, name.replace("\\", "/"))
+            for place in (path, folder / path.name):
+                found = _in_any_case(place)
+                if found.is_file():
+                    return found
+    return None
 
 
-def _eight_bits(words: str) -> tuple[int, int, int]:
-    """The colour of three words from 0 to 1; white where they are none."""
-    try:
-        red, green, blue = (round(255 * min(max(float(word), 0), 1)) for word in words.split()[:3])
-    except ValueError:
-        return WHITE
-    return red, green, blue
+def bare_name(written: str) -> str:
+    """A name without the comment behind it and the quotation marks around it."""
+    name = re.sub(r"\s+#.*", "", written).strip()
+    return name[1:-1] if re.fullmatch(r"\"[^\"]*\"|'[^']*'", name) else name
 
 
-def obj_material_names(data: bytes) -> tuple[list[str], IntArray]:
-    """The names that usemtl lines of an OBJ file give, and (N,) the one of each polygon.
-
-    Name 0 is "", of polygons before the first such line.
-    """
-    names, of = [""], []
-    number: dict[str, int] = {"": 0}
-    current = 0
-    for line in re.sub(rb"\\\r?\n", b" ", plain(data)).splitlines():
-        words = line.split(None, 1)
-        if len(words) == 2 and words[0] in {b"f", b"fo"}:
-            of.append(current)
-        elif len(words) == 2 and words[0] == b"usemtl":
-            name = words[1].strip().decode(errors="surrogateescape")
-            current = number.setdefault(name, len(names))
-            if current == len(names):
-                names.append(name)
-    return names, np.array(of, dtype=np.int64)
+def _in_any_case(path: Path) -> Path:
+    """The path, with the names of the folders where it differs from one of theirs in case alone."""
+    at = Path(path.anchor)
+    for part in path.relative_to(at).parts:
+        ahead = at / part
+        if not ahead.exists() and at.is_dir():
+            same = [one for one in at.iterdir() if one.name.casefold() == part.casefold()]
+            ahead = same[0] if len(same) == 1 else ahead
+        at = ahead
+    return at
 
 
 def painting_of(path: Path, polygon_of: IntArray, uv: FloatArray | None) -> Painting | None:
@@ -165,19 +141,27 @@ def painting_of(path: Path, polygon_of: IntArray, uv: FloatArray | None) -> Pain
 
 
 def _obj(path: Path) -> tuple[tuple[Material, ...], IntArray]:
-    from parapoint.files.obj_rewriting import libraries
+    from parapoint.files.materials import libraries, material_names, materials_of
 
     known = materials_of(libraries(path)[0])
-    names, of = obj_material_names(path.read_bytes())
-    return tuple(known.get(name, Material()) for name in names), of
+    names, of = material_names(path.read_bytes())
+    found = [name if name in known else bare_name(name) for name in names]
+    unknown = [name for name in found if name and name not in known]
+    if known and unknown:
+        logger.warning("%s: no library holds its materials %s", path, ", ".join(unknown))
+    return tuple(known.get(name, Material()) for name in found), of
 
 
 def _ply(path: Path) -> tuple[tuple[Material, ...], IntArray]:
     from parapoint.files.ply_rewriting import pictures_of
 
     names, number_of = pictures_of(path)
-    found = [path.parent / name for name in names]
-    materials = [Material(picture=read_picture(one) if one.is_file() else None) for one in found]
+    materials = []
+    for name in names:
+        found = named_file(path.parent, name)
+        if found is None:
+            logger.warning("%s: the picture %s is not found", path, name)
+        materials.append(Material(picture=None if found is None else read_picture(found)))
     return (*materials, Material()), np.where(number_of < len(names), number_of, len(names))
 
 

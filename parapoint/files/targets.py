@@ -154,7 +154,7 @@ def _seal(before: bytes) -> bytes:
 
 def sealed_text(text: str) -> bytes:
     """The text with a comment line (#) at its end that seals it."""
-    before = f"{text}# ".encode()
+    before = f"{text}# ".encode(errors="surrogateescape")
     return before + _seal(before) + b"\n"
 
 

@@ -346,10 +346,14 @@ def _packed(
     return np.concatenate([uv + at for uv, at in zip(placed, corner, strict=True)])
 
 
-def shelves(sizes: FloatArray) -> FloatArray:
-    """(N, 2) lower left corners of boxes (N, 2) set on shelves, the highest first."""
-    gap = GAP * float(np.sqrt(sizes.prod(axis=1).sum()))
-    sizes = sizes + gap
+def shelves(sizes: FloatArray, gap: float = GAP) -> FloatArray:
+    """(N, 2) lower left corners of boxes (N, 2) set on shelves, the highest first.
+
+    Args:
+        sizes: of the boxes.
+        gap: room between them, over the side of a square of all boxes.
+    """
+    sizes = sizes + gap * float(np.sqrt(sizes.prod(axis=1).sum()))
     width = max(float(sizes[:, 0].max()), float(np.sqrt(sizes.prod(axis=1).sum())))
     corner = np.empty_like(sizes)
     x = y = shelf = 0.0

@@ -1,4 +1,4 @@
-"""Several charts packed into the unit square at one scale, by xatlas."""
+"""Several charts packed into the unit square at one scale, by xatlas or on shelves."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from parapoint.surfaces.surface import FloatArray, IntArray, edge_components
 from parapoint.textures.placing import BORDER, Placing
 
 RESOLUTIONS = (512, 724, 1024)
-"""Texels a side of the grids on which xatlas moves the charts about; the densest result counts.
-Which one that is is chance: the packer draws places at random."""
+"""Texels a side of the grids on which xatlas moves the charts about. Which of them leads to the
+densest result is chance: the packer draws places at random."""
 PASSES = 2
 """The space between charts is a share of the square, whose side is known after a first pass."""
 FLAT = 1e-5
@@ -31,7 +31,9 @@ def packed(charted: Charted, border: float = BORDER) -> Charted:
     """The mesh with its map in the unit square, no chart mirrored and all at one scale.
 
     One chart is turned to its smallest square. Several are packed by xatlas's packer (J. Young),
-    which moves their pictures on a grid; from it we take where each lies and how it is turned.
+    which moves their pictures on a grid; from it we take where each lies and how it is turned. They
+    are set on shelves, too, which fill the square better where charts are many and much alike. The
+    densest result counts.
 
     Args:
         charted: the mesh and its map.
@@ -42,8 +44,13 @@ def packed(charted: Charted, border: float = BORDER) -> Charted:
     layouts = [held.uv]
     if int(held.charts().max(initial=0)) > 0:
         layouts = [_packed(held, border, resolution) for resolution in RESOLUTIONS]
+        layouts.append(_shelved(held, border))
     placings = [Placing.smallest(uv[rows], border) for uv in layouts]
-    best = max(range(len(layouts)), key=lambda k: placings[k].scale)
+    filled = [
+        placing.scale**2 * float(np.abs(signed_areas(uv, held.corners)).sum())
+        for placing, uv in zip(placings, layouts, strict=True)
+    ]
+    best = int(np.argmax(filled))
     placed = Parameterization(placings[best](layouts[best]), held.corners)
     return Charted(charted.mesh, placed)
 
@@ -94,13 +101,37 @@ def _packed(held: Parameterization, border: float, resolution: int) -> FloatArra
     return _moved(shapes, grid)[: len(held.uv)]
 
 
+def _shelved(held: Parameterization, border: float) -> FloatArray:
+    """(T, 2) the map with its charts on shelves, each turned to lie in its smallest square."""
+    chart = _chart_of_rows(held)
+    uv = held.uv.copy()
+    rows = np.argsort(chart, kind="stable")
+    for some in np.split(rows, np.flatnonzero(np.diff(chart[rows])) + 1):
+        turned = uv[some] @ Placing.smallest(uv[some]).turn.T
+        width, height = np.ptp(turned, axis=0)
+        uv[some] = turned if width >= height else turned @ [[0, 1], [-1, 0]]
+    low, high = _boxes(_Shapes(uv, chart, held.corners))
+    sizes = high - low
+    gap, square = border, float(np.sqrt(sizes.prod(axis=1).sum())) or 1.0
+    for _ in range(PASSES):
+        corners = shelves(sizes, gap)
+        gap = border * float((corners + sizes).max()) / square
+    return uv + (corners - low)[chart]
+
+
+def _chart_of_rows(held: Parameterization) -> IntArray:
+    """(T,) the chart of each row of uv; 0 for those of no face."""
+    chart = np.zeros(len(held.uv), dtype=np.int64)
+    chart[held.corners] = held.charts()[:, None]
+    return chart
+
+
 def _apart(held: Parameterization, resolution: int) -> _Shapes:
     """The charts on shelves, sized so that their boxes together fill the grid once.
 
     xatlas takes charts that touch for one, and makes its grid as coarse as the whole map is wide.
     """
-    chart = np.zeros(len(held.uv), dtype=np.int64)
-    chart[held.corners] = held.charts()[:, None]
+    chart = _chart_of_rows(held)
     given = _Shapes(held.uv, chart, held.corners)
     low, high = _boxes(given)
     sizes = high - low

@@ -72,11 +72,12 @@ class Unwrap:
     met, and on until hardly a place is starved of area.
 
     A mesh is begun along the least cut, none for a disk, with or without holes, and the automatic
-    one (`parapoint.surfaces.cutting`) for others; and once more along the seam of the computed map
-    of its faces (`parapoint.computed.faces`), or of points of it where these are slender, made a
-    clean path of edges (`parapoint.surfaces.across_seams`). The better map stays, by its energy and
-    the price of its seam: which start leads to it cannot be told before. Where the map must come
-    below a bound on the energy, it is begun along the map of points, too, and the shortest stays.
+    one (`parapoint.surfaces.cutting`) for others; along cuts from rim to rim, if it is a disk with
+    holes; and along the seam of the computed map of its faces (`parapoint.computed.faces`), or of
+    points of it where these are slender, made a clean path of edges
+    (`parapoint.surfaces.across_seams`). The best map stays, by its energy and the price of its
+    seam: which start leads to it cannot be told before. Where the map must come below a bound on
+    the energy, it is begun along the map of points, too, and the shortest stays.
     Of a large mesh a simplified one tells which start is the better, and where to the seam grows
     (`parapoint.planar.coarse`), but under a bound, as the two differ in energy.
     Components are mapped one after another.
@@ -220,6 +221,9 @@ class Unwrap:
         def least(_: float) -> tuple[BoolArray, dict[str, object]]:
             return _least_cut(mesh), {"not_asked": "the map begins along the least cut"}
 
+        def across_rims(_: float) -> tuple[BoolArray, dict[str, object]]:
+            return disk_cut(mesh), {"not_asked": "the map begins along cuts from rim to rim"}
+
         def along_faces(until: float) -> tuple[BoolArray, dict[str, object]]:
             return _seam(mesh, partial(map_of_faces, mesh), until)
 
@@ -230,7 +234,9 @@ class Unwrap:
         if not self._grows:
             return [along_map]
         is_bounded = self.max_distortion is not None
-        return list(dict.fromkeys([least, along_map, *[along_points] * is_bounded]))
+        has_rims = mesh.is_planar_domain and len(mesh.boundary_loops) > 1
+        starts = [least, *[across_rims] * has_rims, along_map, *[along_points] * is_bounded]
+        return list(dict.fromkeys(starts))
 
     def _cost(self, run: Run) -> tuple[bool, float]:
         """By which of two maps is worse: one that lacks something, or costs more."""

@@ -326,7 +326,8 @@ def points_told(contents: Contents) -> str:
     rows = [row for row in contents.rows if label and contents.labels[row.id] == label]
     counts = sorted(points_used(row) for row in rows if row.status == "ok") or [SPARSE]
     told = " to ".join(f"{count:,}" for count in dict.fromkeys([counts[0], counts[-1]]))
-    budget = [part for part in label.detail.split(", ") if "points" not in part] if label else []
+    parts = label.detail.split(", ") if label and label.detail else []
+    budget = [part for part in parts if "points" not in part]
     return "; ".join([told, *([", ".join(budget)] if budget else [])])
 
 

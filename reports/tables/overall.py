@@ -58,7 +58,7 @@ def outcome(
     column = metric_column(metric)
     grade = str(one["grade"]) if one else ""
     a, b = number(one, metric), number(other, metric)
-    if a is None or b is None or here == 0 or not may_rank(grade, angles=column.angles):
+    if a is None or b is None or not may_rank(grade, angles=column.angles):
         return SHARED
     if a == b or abs(a - b) <= tolerance(metric) * min(abs(a), abs(b)):
         return SHARED

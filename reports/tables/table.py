@@ -214,8 +214,7 @@ def metric_column(name: str, title: str = "", **given: Any) -> Column:
         )
         return replace(column, **given)
     metric = METRICS[name]
-    counts = name.endswith("_count") or metric.unit == "faces" or metric.weighting == "count"
-    digits = 4 if metric.unit == "radians" else 1 if counts else 3
+    digits = 4 if metric.unit == "radians" else 1 if name.endswith("_count") else 3
     column = Column(
         name,
         title or metric.label,

@@ -6,9 +6,12 @@ import json
 import re
 import subprocess
 import sys
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from rich.table import Table
 
 from baselines import registry
 from benchmarks import __main__ as commands
@@ -286,3 +289,80 @@ def test_score_prints_json_and_nothing_else(tmp_path, capsys):
     (tmp_path / "map.obj").write_text("\n".join(lines) + "\n")
     assert command("score", str(tmp_path / "map.obj"), "--json") == 0
     assert json.loads(capsys.readouterr().out)["angle_difference_mean"] == pytest.approx(0)
+
+
+@pytest.mark.parametrize(
+    ("missing", "arguments", "suites_run", "status"),
+    [
+        (6, [], ["paper", "builtin"], 0),
+        (6, ["--strict"], ["paper", "builtin"], 1),  # a cell of the second one has failed
+        (5, ["--strict"], ["paper"], 0),
+        (6, ["--cases", "cone"], ["paper"], 0),
+    ],
+)
+def test_the_built_in_surfaces_stand_in_for_a_whole_suite_alone(
+    missing: int,
+    arguments: list[str],
+    suites_run: list[str],
+    status: int,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[str] = []
+
+    def shown(suite: suites.Suite, *_: Path, **__: object) -> SimpleNamespace:
+        asked.append(suite.name)
+        ended = "skipped" if suite.name == "paper" else "failed"
+        lost = dict.fromkeys(suite.cases[:missing], "download it")
+        rows = [SimpleNamespace(status=ended)]
+        return SimpleNamespace(rows=rows, missing=lost, suite=suite)
+
+    monkeypatch.setattr(commands, "_shown_run", shown)
+    allowed: list[float] = []
+    monkeypatch.setattr("parapoint.files.decoding.allow", allowed.append)
+    assert command("run", "paper", "--memory", "1.5", *arguments) == status
+    assert asked == suites_run
+    assert allowed == [1.5e9]
+
+
+def test_what_is_measured_is_a_table_each_and_a_figure_or_a_race(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    drawn: list[Path] = []
+    for module, names in {
+        "benchmarks.commands.metric_speed": ("metric_costs", "metric_table"),
+        "benchmarks.commands.method_speed": ("overheads", "overhead_table"),
+        "benchmarks.commands.speed": ("training_table",),
+    }.items():
+        for name in names:
+            monkeypatch.setattr(f"{module}.{name}", lambda *_, named=name: Table(title=named))
+    monkeypatch.setattr(
+        "benchmarks.commands.metric_speed.growth_figure", lambda _, path: drawn.append(path)
+    )
+    monkeypatch.setattr(
+        "benchmarks.checks.straightforward.race_table",
+        lambda case, seconds: Table(title=f"{case} {seconds:g}"),
+    )
+
+    def titles(*arguments: str) -> list[str]:
+        assert command("speed", *arguments) == 0
+        return capsys.readouterr().out.split()
+
+    assert titles() == ["metric_table", "overhead_table", "training_table"]
+    assert not drawn
+    assert len(titles("--figure", f"{tmp_path}/growth.PNG")) == 3
+    assert drawn == [tmp_path / "growth.PNG"]
+    assert titles("--race", "cow", "--seconds", "3") == ["cow", "3"]
+    assert command("speed", "--figure", "growth.pdf") == 2
+    assert "give a name that ends in .png" in capsys.readouterr().err
+
+
+def test_a_folder_with_several_versions_of_a_suite_is_said_to_have_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = {"paper": {"1 (a)": 2, "2 (b)": 1}, "core": {"1 (c)": 5}}
+    monkeypatch.setattr("benchmarks.store.versions.versions", lambda *_: found)
+    monkeypatch.setattr("benchmarks.commands.display.print_summary", lambda _: None)
+    monkeypatch.setattr("benchmarks.running.runner.run", lambda *_, **__: "what it did")
+    assert str(commands._shown_run(suites.suite("smoke"), tmp_path)) == "what it did"
+    said = "paper in several versions: 2 of version 1 (a), 1 of version 2 (b)"
+    assert capsys.readouterr().out == f"{tmp_path} holds {said}\n"

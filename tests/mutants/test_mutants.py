@@ -18,10 +18,10 @@ def f(x: int | None = 2, *, y: float) -> int | str:
         raise ValueError(f"{1 + 1} is not {2 * y}")
     return zip(*x, y and -x, strict=True)
 MOST: int = 50
-LEAST = 9 * [0.5, 12]
+LEAST = 9 * [0.5, 1e9]
 if TYPE_CHECKING:
     import g
-column = f(x.reshape(-1, 3), digits=2, figsize=(3, 4)), round(y, 2), default_rng(0)
+column = f(x.reshape((-1, 3)), digits=2, figsize=(3, 4)), round(y, 2), default_rng(0)
 '''
 
 
@@ -46,13 +46,13 @@ def test_code_is_changed_but_not_what_is_words_or_looks_or_as_good_another_way()
         (6, "ifnotnotx:"),
         (8, "returnzip(*x,yor-x,strict=True)"),
         (8, "returnzip(*x,yandx,strict=True)"),
-        (10, "LEAST=10*[0.5,12]"),
-        (10, "LEAST=8*[0.5,12]"),
-        (10, "LEAST=9/[0.5,12]"),
-        (10, "LEAST=9*[1.5,12]"),
-        (10, "LEAST=9*[-0.5,12]"),
-        (13, "column=f(x.reshape(-1,4),digits=2,figsize=(3,4)),round(y,2),default_rng(0)"),
-        (13, "column=f(x.reshape(-1,2),digits=2,figsize=(3,4)),round(y,2),default_rng(0)"),
+        (10, "LEAST=10*[0.5,1e9]"),
+        (10, "LEAST=8*[0.5,1e9]"),
+        (10, "LEAST=9/[0.5,1e9]"),
+        (10, "LEAST=9*[1.5,1e9]"),
+        (10, "LEAST=9*[-0.5,1e9]"),
+        (13, "column=f(x.reshape((-1,4)),digits=2,figsize=(3,4)),round(y,2),default_rng(0)"),
+        (13, "column=f(x.reshape((-1,2)),digits=2,figsize=(3,4)),round(y,2),default_rng(0)"),
     }
 
 

@@ -124,6 +124,15 @@ def test_means_are_over_the_seeds_that_ended_well(tmp_path):
     assert record["reason"] == "it broke"
 
 
+def test_of_several_ends_without_a_map_the_first_is_told(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for seed, status in enumerate(("timeout", "failed", "out_of_memory")):
+            writer.cell(HAND, None, "slim", {}, seed=seed, status=status, reason=f"no {seed}")
+    record = contents(tmp_path)[0].means.iloc[0]
+    assert (record["ok"], record["status"], record["reason"]) == (0, "timeout", "no 0")
+
+
 def test_atlases_are_known_by_their_charts(tmp_path):
     mesh = sheet()
     apart = flat(mesh)
@@ -135,14 +144,16 @@ def test_atlases_are_known_by_their_charts(tmp_path):
     assert contents(tmp_path)[0].atlases == {"xatlas"}
 
 
-@pytest.mark.parametrize(("many", "atlases"), [(1, set()), (2, {"xatlas"})])
-def test_an_atlas_cuts_most_models_and_not_just_one(tmp_path, many, atlases):
+@pytest.mark.parametrize(
+    ("many", "of", "atlases"), [(1, 3, set()), (1, 2, set()), (2, 3, {"xatlas"})]
+)
+def test_an_atlas_cuts_most_models_and_not_just_one(tmp_path, many, of, atlases):
     mesh = sheet()
     whole = flat(mesh)
     pieces = type(whole)(whole.uv[whole.corners].reshape(-1, 2), range_corners(len(mesh.faces)))
     writer = Writer(tmp_path)
     with writer.store.writing():
-        for number, case in enumerate("abc"):
+        for number, case in enumerate("abc"[:of]):
             writer.cell(case, mesh, "lscm", {}, result=whole)
             writer.cell(case, mesh, "xatlas", {}, result=pieces if number < many else whole)
     assert contents(tmp_path)[0].atlases == atlases
@@ -202,6 +213,19 @@ def test_maps_of_a_part_are_no_rivals_of_maps_of_the_whole(tmp_path, left_out, p
     assert suite.unranked >= partial
 
 
+@pytest.mark.parametrize(
+    ("covered", "partial"), [([0.5, 1.0], set()), ([0.5, 0.5, 1.0], {"DA-Wand"})]
+)
+def test_a_method_of_parts_leaves_out_some_of_most_models(tmp_path, covered, partial):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for number in range(len(covered)):
+            writer.cell(f"model {number}", sheet(3), "da_wand", {}, result=flat(sheet(3)))
+    suite = contents(tmp_path)[0]
+    suite.means["coverage"] = covered
+    assert suite.partial == partial
+
+
 def test_names_do_not_repeat_what_tells_them_apart_already(tmp_path):
     few = {"points": 4096, "subset": 256, "charts": 1}
     found = labels(
@@ -221,7 +245,7 @@ def test_names_do_not_repeat_what_tells_them_apart_already(tmp_path):
     }
 
 
-@pytest.mark.parametrize(("charts", "atlases"), [(5.0, set()), (16.0, {"LSCM"})])
+@pytest.mark.parametrize(("charts", "atlases"), [(5.0, set()), (15.0, set()), (16.0, {"LSCM"})])
 def test_a_chart_for_each_component_is_not_many(charts, atlases, tmp_path):
     one = sheet()
     count = len(one.vertices)

@@ -20,6 +20,8 @@ from reports.numbers import printed
         (99_999.0, 0, "99,999"),
         (100_000.0, 0, "1.0·10⁵"),
         (-2.5e12, 0, "−2.5·10¹²"),
+        (12_345.678, 3, "12,345.7"),  # six digits and no more
+        (99_999.6, 1, "100,000"),
     ],
 )
 def test_numbers(value, digits, text):

@@ -8,14 +8,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
 
+from benchmarks.rendering.maps import ANGLE_SCALE, AREA_SCALE
+from benchmarks.running.scratch import MARK
 from parapoint import console
+from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization
 from parapoint.surfaces.surface import PointCloud
 from reports.__main__ import main
 from reports.contents import contents
 from reports.page.sections import Section
-from reports.report import write
+from reports.report import claim, write
 
 from .conftest import HAND, SLIM, Writer, flat, sheet
 
@@ -106,6 +111,34 @@ def test_every_table_is_there_in_four_formats(reported):
     assert {path.stem for path in folder.iterdir()} == names
     kinds = (".tex", ".md", ".csv", ".html")
     assert all((folder / f"{name}{kind}").exists() for name in names for kind in kinds)
+
+
+def test_a_report_takes_no_place_that_is_not_its_own(tmp_path):
+    """What is not there, an empty folder and one of ours are taken; all else stays as it is."""
+    (tmp_path / "empty").mkdir()
+    for free in ("deep/er", "empty", "deep/er"):
+        claim(tmp_path / free)
+        assert [path.name for path in (tmp_path / free).iterdir()] == [MARK]
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "file").touch()
+    (tmp_path / "link").symlink_to(tmp_path / "empty")
+    (tmp_path / "nowhere").symlink_to(tmp_path / "gone")
+    for taken in ("file", "full", "link", "nowhere"):
+        with pytest.raises(InputError, match="is in the way and not known to be ours"):
+            claim(tmp_path / taken)
+    assert (tmp_path / "file").read_text() == "mine"
+    assert not (tmp_path / "gone").exists()
+
+
+def test_the_colours_of_a_scale_run_over_the_whole_map(reported):
+    (page,) = (reported / "report" / "models").rglob("mannequin*.html")
+    facts = json.loads(re.search(r'id="facts">(.*?)</script>', page.read_text("utf-8"))[1])
+    for name, scale in (("angle", ANGLE_SCALE), ("area", AREA_SCALE)):
+        colours, low, high = scale
+        expected = [to_hex(colormaps[colours](place)) for place in (0.0, 0.25, 0.5, 1.0)]
+        assert [facts["scales"][name][at] for at in (0, 8, 16, -1)] == expected
+        assert facts["limits"][name] == [low, high]
 
 
 def test_failed_cells_only_give_a_report_that_says_so(tmp_path):

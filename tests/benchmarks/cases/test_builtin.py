@@ -15,6 +15,7 @@ from benchmarks.cases.builtin import (
     SAMPLED_POINTS,
     WAVE_HEIGHT,
     cone,
+    finger,
     half_cylinder,
     saddle,
     sampled,
@@ -199,3 +200,15 @@ def test_shapes_and_the_order_of_their_vertices_stay(name):
     ordered = np.abs(at @ [1, 2, 3]) @ np.arange(vertices) / vertices**2
     found = np.concatenate([at.mean(axis=0), at.std(axis=0), [ordered]])
     np.testing.assert_allclose(found, wanted, atol=2e-4)
+
+
+def test_a_finger_stands_on_a_flat_disk_and_is_long_and_thin() -> None:
+    mesh = finger()
+    assert mesh.topology == "disk"
+    away, height = np.linalg.norm(mesh.vertices[:, :2], axis=1), mesh.vertices[:, 2]
+    assert away.max() == pytest.approx(1)
+    assert height.max() == pytest.approx(3)
+    assert height.min() == 0
+    assert away[height > 0].max() <= 0.15 + 1e-12
+    assert away[height == 0].min() == pytest.approx(0.15, abs=0.1)
+    assert 0.2 < (height > 0).mean() < 0.3  # within half of the radius lies a quarter

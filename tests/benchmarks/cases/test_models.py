@@ -8,6 +8,7 @@ import re
 import threading
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import igl
 import numpy as np
@@ -277,6 +278,17 @@ def test_a_download_takes_no_more_than_the_registered_size(monkeypatch, tmp_path
     assert Endless.sent < 20_000_000  # what lay in buffers
 
 
+@pytest.mark.parametrize(("more", "fits"), [(0, True), (1, False)])
+def test_a_download_may_have_all_of_its_bytes_and_not_one_more(more: int, fits: bool) -> None:
+    model = replace(models.registry()["cylinder_cgal"], size=1000)
+    response = SimpleNamespace(
+        iter_content=lambda size: iter([bytes(size), bytes(1000 - size + more)]), close=bool
+    )
+    models._bound(model, response)
+    with contextlib.nullcontext() if fits else pytest.raises(InputError, match="more than 1000"):
+        assert sum(map(len, response.iter_content(600))) == 1000
+
+
 def test_the_mirror_is_used_and_checked(no_network, mirror, monkeypatch):
     file = mirror / "paper" / "cylinder_cgal.off"
     file.parent.mkdir()
@@ -330,6 +342,20 @@ def test_a_model_is_cut_along_the_seam_drawn_on_it(tmp_path, monkeypatch):
         InputError, match="nobody has drawn a seam on torus; there is one on sphere"
     ):
         models.load("torus@drawn")
+
+
+def test_a_seam_may_be_a_single_edge(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the rim of a sheet inwards it opens a slit, whose end on the rim has two copies."""
+    sheet = models.load("wavy_sheet")
+    assert isinstance(sheet, Mesh)
+    rim = set(sheet.boundary_loops[0].tolist())
+    edges = np.concatenate([sheet.faces[:, :2], sheet.faces[:, 1:]]).tolist()
+    a, b = next((a, b) for a, b in edges if a in rim and b not in rim)
+    (tmp_path / "wavy_sheet.txt").write_text(f"{a} {b}\n")
+    monkeypatch.setattr(derived, "seam_file", lambda model: tmp_path / f"{model}.txt")
+    cut = models.load("wavy_sheet@drawn")
+    assert isinstance(cut, Mesh)
+    assert len(cut.vertices) == len(sheet.vertices) + 1
 
 
 def test_each_drawn_seam_opens_its_model_to_a_disk():

@@ -1,8 +1,12 @@
 """What the checks of hardships count: no fault where there is none, and each that there is."""
 
+import errno
 import json
+import random
 import subprocess
+import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -86,6 +90,11 @@ def test_what_is_left_of_commands_that_are_broken_off_is_told(fault, tmp_path, m
     assert fault is None or fault in found.faults[0]
 
 
+def test_processes_that_are_not_ours_are_not_found(tmp_path: Path) -> None:
+    """What is found is killed: all other processes of the machine must not be."""
+    assert hardships._started("a tag that no process has", tmp_path) == []
+
+
 def test_processes_that_a_broken_command_leaves_are_told(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(hardships, "GONE_AFTER", 0.2)
     waits = "import subprocess, time; {}; time.sleep(60)"
@@ -93,3 +102,121 @@ def test_processes_that_a_broken_command_leaves_are_told(tmp_path, monkeypatch) 
         code = waits.format(then or "pass")
         signals = hardships.MANNERS["stopped and killed"]
         assert len(hardships._broken_off(["-c", code], tmp_path, signals, 1.0)) == count
+
+
+@pytest.mark.parametrize(("status", "fault"), [(0, False), (1, True)])
+def test_each_process_of_a_run_is_killed_once_and_then_a_report_must_end_well(
+    status: int, fault: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[str, str, bool]] = []
+
+    def killed(
+        victim: str, command: list[str], folder: Path, _: random.Random
+    ) -> hardships.Hardship:
+        asked.append((victim, command[1], folder.is_dir()))
+        return hardships.Hardship(1, ["a fault"] if victim == "cell" else [])
+
+    monkeypatch.setattr(
+        bystanders,
+        "inputs",
+        lambda at: {"mesh": at / "mesh.obj"} if at.mkdir(parents=True) is None else {},
+    )
+    monkeypatch.setattr(hardships, "_killed", killed)
+    ended(monkeypatch, lambda _: None, status, "error: no\n")
+    found = hardships.kills(tmp_path, seed=0)
+    runs = [(victim, "benchmarks", True) for victim in ("run", "supervisor", "cell")]
+    assert asked == [*runs, ("report", "reports", True)]
+    assert found.tried == 5
+    after = ["a report after one that was killed: error: no"] if fault else []
+    assert found.faults == ["a fault", *after]
+
+
+class Mounts:
+    """A system that mounts nothing in truth; notes what it is asked for, and refuses one word."""
+
+    def __init__(self, refused: str = "nothing") -> None:
+        self.refused = refused
+        self.asked: list[str] = []
+
+    def run(self, command: list[str], **_: object) -> SimpleNamespace:
+        self.asked.append(" ".join(command[:3]))
+        return SimpleNamespace(returncode=int(self.refused in " ".join(command)))
+
+
+@pytest.mark.parametrize(
+    ("state", "refused", "begins"),
+    [
+        ("full", "nothing", hardships._as_it_is),
+        ("full", "tmpfs", hardships._no_room),
+        ("read-only", "nothing", hardships._as_it_is),
+        ("read-only", "tmpfs", None),
+        ("read-only", "remount", None),
+    ],
+)
+def test_a_disk_is_full_or_read_only_or_cannot_be_made(
+    state: str, refused: str, begins: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "results").mkdir()
+    place = tmp_path / "disk"
+    place.mkdir()
+    system = Mounts(refused)
+    room = iter([4096, 4096])
+
+    def write(_: int, content: bytes) -> int:
+        if len(content) != next(room, 0):
+            raise OSError(errno.ENOSPC, "no space left on device")
+        return len(content)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(hardships.subprocess, "run", system.run)
+        patch.setattr(hardships.os, "write", write)
+        with hardships._disk(place, state, tmp_path / "results") as limits:
+            assert limits is begins
+            assert (place / "mine").is_dir()
+            assert (place / "results").is_dir()
+    is_mounted = refused != "tmpfs"
+    assert (system.asked[-1] == f"umount -l {place}") == is_mounted
+    assert ("mount -o remount,ro" in system.asked) == (is_mounted and state == "read-only")
+    assert (next(room, 0) == 0) == (is_mounted and state == "full")  # it is filled to its end
+
+
+def test_a_command_is_run_to_its_end_and_its_last_words_are_kept(tmp_path: Path) -> None:
+    says = "import sys, benchmarks; print('here'); sys.exit('first\\nlast')"
+    done = hardships._run(["-c", says], tmp_path)
+    assert (done.returncode, done.stdout) == (1, "here\n")
+    assert hardships._said(done) == "last"
+    writes = ["-c", "from pathlib import Path; Path('file').write_text('words')"]
+    done = hardships._run(writes, tmp_path, hardships._as_it_is)
+    assert (done.returncode, hardships._said(done)) == (0, "nothing")
+    assert (tmp_path / "file").read_text() == "words"
+    done = hardships._run(writes, tmp_path, hardships._no_room)
+    assert (done.returncode, (tmp_path / "file").read_text()) == (1, "")
+
+
+FIVE = "import subprocess as s; a = [s.Popen(['sleep', '60']) for _ in range(4)]; a[0].wait()"
+
+
+@pytest.mark.parametrize(
+    ("victim", "code", "left"),
+    [
+        ("run", FIVE, 4),
+        ("supervisor", FIVE, 3),  # the command ends by itself, without its first process
+        ("report", "pass", 0),
+        ("report", "import time; time.sleep(60)", 0),
+    ],
+)
+def test_the_victim_alone_is_killed_and_what_is_left_is_told(
+    victim: str, code: str, left: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sleep = time.sleep
+    monkeypatch.setattr(hardships, "GONE_AFTER", 0.1)
+    monkeypatch.setattr(hardships.time, "sleep", lambda seconds: sleep(min(seconds, 0.05)))
+    found = hardships._killed(victim, ["-c", code], tmp_path, random.Random(0))  # noqa: S311
+    assert found.tried == 1
+    assert len(found.faults) == left
+    assert all(fault.startswith(f"kill of a {victim}: process ") for fault in found.faults)
+    for _ in range(100):
+        if not hardships._started("no tag", tmp_path):
+            return
+        sleep(0.02)
+    pytest.fail("what was left goes on")

@@ -2,10 +2,15 @@
 
 import csv
 import math
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
+from click.testing import CliRunner
 
+from benchmarks.cases.suites import Suite
 from benchmarks.checks import regress
 from benchmarks.checks.regress import (
     COMPARISONS,
@@ -29,6 +34,7 @@ def line(**values):
 @pytest.mark.parametrize(
     ("old", "new", "relative", "absolute", "excess"),
     [
+        ("-2", "-2.5", 0.1, 0.3, 1),
         ("1", "1", 0, 0, 0),
         ("1", "1.001", 0.01, 0, 0.1),
         ("1", "1.03", 0.01, 0, 3),
@@ -53,6 +59,8 @@ def test_what_moved_is_named_with_its_case():
     found = {(move.case, move.metric) for move in moves("lscm", golden, now, allowed)}
     assert found == {("spot", "chart_count"), ("gone", "status"), ("new", "status")}
     assert moves("lscm", {"a": line(status="ok")}, {"a": line(status="failed")}, allowed)
+    at_most = dict.fromkeys(SOLVERS.metrics, Tolerance(0, 1, ""))
+    assert not moves("lscm", {"a": line(resolution="2")}, {"a": line(resolution="3")}, at_most)
 
 
 def test_the_table_shows_the_farthest_first():
@@ -62,7 +70,9 @@ def test_the_table_shows_the_farthest_first():
     ]
     columns = [[str(c) for c in column.cells] for column in regress.table(found).columns]
     assert columns[1] == ["boat", "spot"]
-    assert columns[5] == ["", "+1"]
+    assert columns[5:] == [["", "+1"], ["inf", "3"]]
+    headings = [str(column.header) for column in regress.table(found).columns]
+    assert headings == ["method", "case", "metric", "golden", "now", "change", "/ tolerance"]
 
 
 @pytest.fixture
@@ -127,10 +137,14 @@ def test_known_figures_are_met_or_named():
     for row in rows:
         now[row["method"]][row["case"]] = line(angle_difference_mean=row["value"])
     assert regress.missed_figures(rows, now) == []
+    now["lscm"]["camelhead"]["angle_difference_mean"] = "0.02461"
+    assert regress.missed_figures(rows, now) == []  # within its tolerance
     now["lscm"]["camelhead"]["angle_difference_mean"] = "0.03"
     assert [(m.case, m.golden) for m in regress.missed_figures(rows, now)] == [
         ("camelhead", "0.0246")
     ]
+    del now["lscm"]["beetle_igl"]  # a model that is not at hand says nothing of the others
+    assert len(regress.missed_figures(rows, now)) == 1
 
 
 @pytest.mark.parametrize(
@@ -147,3 +161,102 @@ def test_golden_files_have_every_case_and_column(comparison, spec):
         assert set(row) == {"case", "status", *comparison.metrics}
         assert row["status"] in ("ok", "skipped")
         assert any(row[name] for name in comparison.metrics) == (row["status"] == "ok")
+
+
+class Run:
+    """A run of a suite that computes nothing: three cells, one of them without its model."""
+
+    def __init__(self, suite: Suite) -> None:
+        self.missing = {"boat": "download it"}
+        self.unmeasured = {"2": "too large"}
+        self.kept = [SimpleNamespace(id="0", case="spot", status="ok")]
+        self.ran = [
+            SimpleNamespace(id="1", case="boat", status="skipped"),
+            SimpleNamespace(id="2", case="hand", status="ok"),
+        ]
+        (self.name,) = suite.methods
+
+    def spec(self, _: object) -> str:
+        return self.name
+
+
+def test_cells_are_measured_but_those_without_a_model(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    frame = pd.DataFrame(math.nan, index=range(3), columns=list(METRICS)).assign(id=list("012"))
+    frame.loc[0, "chart_count"] = 3.0
+    monkeypatch.setattr(regress, "RESULTS", tmp_path)
+    monkeypatch.setattr("benchmarks.running.runner.run", lambda suite, *_, **__: Run(suite))
+    monkeypatch.setattr("benchmarks.commands.display.print_summary", lambda _: None)
+    monkeypatch.setattr("benchmarks.store.measuring.metrics", lambda _: frame)
+    found = regress.measured(Suite("regress", "", ("spot", "boat", "hand"), ("lscm",)))
+    assert found == {
+        "lscm": {"spot": cell("ok", {"chart_count": 3.0}), "hand": cell("unmeasured", {})}
+    }
+
+
+@pytest.fixture
+def golden(comparison: Comparison, monkeypatch: pytest.MonkeyPatch) -> Comparison:
+    """Golden values of two methods and two models, of which one is at hand, and known figures."""
+    lines = "".join(f"{name},0,0.5,why\n" for name in comparison.metrics)
+    path = comparison.folder / "tolerances.csv"
+    path.write_text(f"metric,relative,absolute,reason\n{lines}")
+    for spec in comparison.methods:
+        regress.write_golden(spec, {"spot": line(), "boat": line()}, comparison)
+    figures = "spot,lscm,resolution,1,0.5,why\nhand,slim,resolution,1,0.5,why\n"
+    header = "case,method,metric,value,tolerance,reason\n"
+    (comparison.folder.parent / "figures.csv").write_text(header + figures)
+    monkeypatch.setattr(regress, "COMPARISONS", (comparison,))
+    monkeypatch.setattr(
+        regress, "figures", lambda: regress.read_rows(path.parents[1] / "figures.csv")
+    )
+    return comparison
+
+
+@pytest.mark.parametrize(
+    ("change", "update", "ends"),
+    [
+        ({"resolution": "1.4"}, [], (0, 0, 0)),
+        ({"resolution": "1.6"}, [], (1, 1, 1)),
+        ({"resolution": "1.6"}, ["--update"], (1, 1, 1)),
+        ({"chart_count": "2"}, [], (1, 1, 0)),
+        ({"chart_count": "2"}, ["--update"], (0, 1, 0)),
+    ],
+)
+def test_what_moved_ends_the_comparison_unless_it_is_meant(
+    change: dict[str, str],
+    update: list[str],
+    ends: tuple[int, int, int],
+    golden: Comparison,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Golden values can be rewritten; known figures cannot. Only models at hand are compared."""
+    asked: list[tuple[tuple[str, ...], tuple[str, ...]]] = []
+
+    def measured(suite: Suite) -> dict[str, regress.Rows]:
+        asked.append((suite.cases, suite.methods))
+        here = {"lscm": {"spot": line(**change)}, "tutte": {"spot": line()}}
+        return {spec: here.get(spec, {"hand": line()}) for spec in suite.methods}
+
+    monkeypatch.setattr(regress, "measured", measured)
+    ended = CliRunner().invoke(regress.main, update)
+    status, moved, missed = ends
+    assert ended.exit_code == status
+    said = f"{moved} values moved, {missed} known figures missed"
+    rewritten = "; golden values rewritten" if update else ""
+    *table, last = ended.output.splitlines()
+    assert last == f"2 cells compared, 2 without their model: {said}{rewritten}"
+    assert bool(table) == bool(moved)
+    assert asked == [(("spot", "boat"), ("lscm", "tutte")), (("hand",), ("slim",))]
+    ((name, value),) = change.items()
+    assert regress.golden_rows("lscm", golden)["spot"][name] == (value if update else "1")
+    assert regress.golden_rows("lscm", golden)["boat"][name] == "1"
+
+
+def test_a_comparison_without_any_model_is_refused(
+    golden: Comparison, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(regress, "measured", lambda _: {spec: {} for spec in golden.methods})
+    ended = CliRunner().invoke(regress.main)
+    assert isinstance(ended.exception, InputError)
+    assert "no model is at hand" in str(ended.exception)

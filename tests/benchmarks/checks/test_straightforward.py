@@ -1,6 +1,9 @@
 """The straightforward implementation is the same method: its gradients, on a few points."""
 
 import dataclasses
+import time
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,17 +17,19 @@ from benchmarks.checks.straightforward import (
     straightforward_maps,
     straightforward_networks,
 )
-from parapoint import InputError
+from parapoint import InputError, Mesh
 from parapoint.learned.presets import PAPER
 from parapoint.learned.trainer import Trainer
+from parapoint.surfaces.surface import FloatArray
 
 
 def test_it_trains() -> None:
     points = np.random.default_rng(0).normal(size=(120, 3))
     points /= np.linalg.norm(points, axis=1, keepdims=True)
     maps = straightforward_maps(points, points[:7], 0)
+    begin = time.process_time()
     (first, before), *_, (last, after) = [next(maps) for _ in range(4)]
-    assert 0 < first < last
+    assert 0 < first < last <= time.process_time() - begin
     assert after.shape == (7, 2)
     assert np.isfinite(after).all()
     assert np.abs(after - before).max() > 1e-4
@@ -70,6 +75,72 @@ def test_the_trainer_has_its_loss_and_its_gradients() -> None:
         own = torch.cat([linear.weight.grad.T, linear.bias.grad[None]])
         difference, size = (layer.grad - own).norm(), own.norm()
         assert float(difference) <= 1e-4 * float(size)
+
+
+def test_the_lattice_has_about_as_many_points_as_the_cloud(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is the square from -1 to 1, in which the networks' maps lie."""
+    lattices: list[torch.Tensor] = []
+
+    def loss(networks: Any, _: object, grid: torch.Tensor) -> torch.Tensor:
+        lattices.append(grid)
+        total: torch.Tensor = sum(weight.sum() for weight in networks.parameters())
+        return total
+
+    monkeypatch.setattr(straightforward, "straightforward_loss", loss)
+    points = np.random.default_rng(0).normal(size=(120, 3))
+    next(straightforward_maps(points, points[:7], 0))
+    (lattice,) = lattices
+    assert lattice.shape == (11 * 11, 2)
+    assert len(lattice.unique(dim=0)) == len(lattice)
+    assert lattice.amin(0).tolist() == [-1, -1]
+    assert lattice.amax(0).tolist() == [1, 1]
+
+
+SQUARE = Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+
+
+def test_a_race_measures_after_twice_as_many_steps_until_time_is_over(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A step of the straightforward way takes a second here, and the maps are all isometries."""
+    seeds: list[int] = []
+
+    class Rival:
+        def __init__(self, *preset: str, seed: int, **options: object) -> None:
+            assert options == ({"time_budget": 5.0, "device": "cpu"} if preset else {})
+            seeds.append(seed)
+            self.report_ = {"iterations": 30} if preset else {}
+
+        def fit(self, _: Mesh) -> "Rival":
+            return self
+
+        def transform(self, points: FloatArray) -> FloatArray:
+            return points[:, :2]
+
+    def maps(_: object, at: FloatArray, seed: int) -> Iterator[tuple[float, FloatArray]]:
+        seeds.append(seed)
+        return ((float(step), at[:, :2]) for step in range(1, 100))
+
+    def points(mesh: Mesh, count: int, seed: int) -> FloatArray:
+        seeds.append(seed)
+        assert count == PAPER.points
+        return mesh.vertices
+
+    monkeypatch.setattr(straightforward.models, "load", lambda _: SQUARE)
+    monkeypatch.setattr("parapoint.computed.computed_map.ComputedMap", Rival)
+    monkeypatch.setattr("parapoint.learned.parapoint.ParaPoint", Rival)
+    monkeypatch.setattr("parapoint.surfaces.sampling.training_points", points)
+    monkeypatch.setattr(straightforward, "straightforward_maps", maps)
+    computed, learned, *plain = race("square", 5.0)
+    assert (computed.what, computed.iterations) == ("computed", 0)
+    assert (learned.what, learned.iterations) == ("learned", 30)
+    assert 0 <= computed.cpu_seconds < 1
+    assert [(row.iterations, row.cpu_seconds) for row in plain] == [(1, 1), (2, 2), (4, 4), (5, 5)]
+    assert {row.what for row in plain} == {"straightforward"}
+    assert [row.angle_difference for row in (computed, learned, *plain)] == pytest.approx([0] * 6)
+    assert seeds == [0] * 4
+    list(race("square", 5.0, seed=7))
+    assert seeds[4:] == [7] * 4
 
 
 def test_the_table_has_a_row_for_each_thing_reached(monkeypatch) -> None:

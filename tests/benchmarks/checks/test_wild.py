@@ -42,3 +42,26 @@ def test_a_wrong_file_and_a_refusal_are_counted(
     ended = CliRunner().invoke(wild.main)
     assert ended.exit_code == 1
     assert "four: 4 files, 1 read, 2 refused (50%), wrong: wrong.xyz, refused.xyz" in ended.output
+
+
+@pytest.mark.parametrize(
+    ("family", "name", "other_family", "other"),
+    [
+        ("polygons", "l0.obj", "polygons", "arrow0.obj"),  # another area
+        ("split vertices", "soup.obj", "polygons", "l0.obj"),  # no seam
+        ("glTF", "plain.gltf", "glTF", "scaled.gltf"),  # another area
+        ("glTF", "plain.gltf", "glTF", "twice.gltf"),  # more faces
+        ("LAS", "whole_8.las", "LAS", "low_noise_8.las"),  # fewer points
+        ("LAS", "whole_8.las", "LAS", "whole_16.las"),  # colours of more bits
+        ("marks", "utf-16.xyz", "writers", "writer_0.obj"),  # other points
+    ],
+)
+def test_a_file_that_means_something_else_is_wrong(
+    family: str, name: str, other_family: str, other: str, tmp_path: Path
+) -> None:
+    own = {case.name: case for case in wild.FAMILIES[family]()}[name]
+    another = {case.name: case for case in wild.FAMILIES[other_family]()}[other]
+    path = tmp_path / other
+    path.write_bytes(another.data)
+    assert another.is_right(path)
+    assert not own.is_right(path)

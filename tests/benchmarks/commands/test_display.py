@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 
 import pytest
@@ -142,3 +143,35 @@ def test_the_summary_counts_grades_and_names_the_worst_part(capsys):
         "s": "2",
         "MB": "-",
     }
+
+
+def test_the_summary_ends_with_what_went_wrong_and_what_the_harness_took(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    *bad, good = cells(*(f"case {n}" for n in range(23)))
+    late = {"status": "timeout", "reason": "late"}
+    rows = [ResultRow(**(vars(cell.row) | late)) for cell in bad]
+    rows.append(ResultRow(**(vars(good.row) | {"status": "ok"})))
+    summary = Summary(SUITES["paper"], [good.method], ran=rows, seconds=10.0, method_seconds=7.5)
+    summary.unmeasured = {good.row.id: "too large"}
+    summary.missing = {"cow": "download it"}
+    print_summary(summary)
+    assert capsys.readouterr().out.splitlines()[3:] == [
+        *(f"case {n}, {LONG}: timeout: late" for n in range(20)),
+        "and 2 more that did not end well: see runs.jsonl",
+        f"case 22, {LONG}: no metrics: too large",
+        "cow is left out: download it",
+        "23 cells in 10.0 s, of which the harness took 2.5 s",
+    ]
+
+
+def test_a_plan_names_the_first_cells_that_run_again_and_why() -> None:
+    new, *again = cells(*(f"case {n}" for n in range(23)))
+    again = [dataclasses.replace(cell, why="method changed") for cell in again]
+    summary = Summary(SUITES["paper"], [new.method], [new, *again], kept=[new.row])
+    assert display.plan(summary).splitlines() == [
+        "paper: 23 cells to run (22 method changed, 1 new); 1 are done already",
+        *(f"again: case {n}, {LONG}, seed 0: method changed" for n in range(1, 21)),
+        "and 2 more again",
+    ]
+    assert display.plan(Summary(SUITES["paper"], [])) == "paper: 0 cells to run"

@@ -31,6 +31,8 @@ def test_rows_say_what_is_known():
     assert row("cases", "half_cylinder")["claim"] == "made in memory"
     spot = models.info("spot_c3d")
     assert row("cases", "spot_c3d")["topology"] == spot.topology
+    claimed = next(model for model in models.registry().values() if model.claim)
+    assert row("cases", claimed.name)["claim"] == claimed.claim
     smoke = SUITES["smoke"]
     assert row("suites", "smoke")["cases"] == ", ".join(smoke.cases)
 

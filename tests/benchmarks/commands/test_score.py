@@ -3,13 +3,21 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from benchmarks.__main__ import main
-from benchmarks.commands.score import json_values, map_state, number, same_faces, worst_faces
+from benchmarks.commands.score import (
+    json_values,
+    map_state,
+    number,
+    same_faces,
+    worst_faces,
+    worst_table,
+)
 from benchmarks.metrics import evaluation
 from benchmarks.metrics.evaluation import evaluate
 from benchmarks.metrics.grades import GRADES
@@ -106,6 +114,28 @@ def test_the_worst_faces_are_named(tmp_path):
     ratio[state.distortion.faces] = state.distortion.quasi_conformal
     assert angle.tolist() == np.argsort(-ratio, kind="stable").tolist()
     assert set(area.tolist()) == {0, 1, 2, 3}
+    columns = {str(column.header): list(column.cells) for column in worst_table(state).columns}
+    assert columns["worst by"] == ["angle"] * 4 + ["area"] * 4
+    assert columns["face"] == [str(face) for face in (*angle, *area)]
+    first = int(angle[0])
+    assert columns["vertices"][0] == " ".join(map(str, state.mesh.faces[first]))
+    assert columns["chart"][0] == str(state.parameterization.charts()[first])
+    assert columns["σ1/σ2"][0] == number(ratio[first])
+    assert columns["notes"] == [""] * 8
+
+
+def test_what_is_wrong_with_one_of_the_worst_faces_is_noted(tmp_path: Path) -> None:
+    path = tmp_path / "folded.obj"
+    path.write_text(OBJ.replace("vt 4 1", "vt 0 5"))
+    columns = {
+        str(column.header): list(column.cells) for column in worst_table(map_state(path)).columns
+    }
+    notes = dict(zip(columns["face"], columns["notes"], strict=True))
+    flipped = map_state(path).validity.flipped
+    assert flipped.any()
+    assert {face for face, note in notes.items() if "flipped" in note} == {
+        str(face) for face in np.flatnonzero(flipped)
+    }
 
 
 def test_a_point_cloud_is_scored_without_a_mesh(tmp_path, capsys):

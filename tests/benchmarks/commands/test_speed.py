@@ -48,6 +48,8 @@ def test_each_row_of_the_table_is_measured(monkeypatch) -> None:
         return products(*given, **how)
 
     monkeypatch.setattr(speed, "_products", noted)
+    monkeypatch.setattr("parapoint.learned.networks.products", lambda _, tangents: (tangents, 5))
+    monkeypatch.setattr("parapoint.learned.networks.cost", lambda _: 7)
     rows = speed.training_rates()
     assert len(rows) == 5
     assert rows[0].gflops == pytest.approx(2 * 32**3 / rows[0].cpu_seconds / 1e9)
@@ -55,6 +57,12 @@ def test_each_row_of_the_table_is_measured(monkeypatch) -> None:
     # A step of 100 points has a lattice of as many, of which Wrap takes three rows each.
     assert [(count, how["backward"]) for _, count, how in asked[::2]] == [(600, True)] * 2
     assert [how["backward"] for _, _, how in asked[1::2]] == [False] * 2
+    # Two a product: of a step, forward and twice as many backward, in `learned` with two tangents
+    # of the surface; and of Cut and Unwrap in a mapping.
+    operations = [row.gflops * 1e9 * row.cpu_seconds for row in rows[1:]]
+    paper, learned = (3 * 2 * (tangents * 100 + 5 * 100) for tangents in (0, 2))
+    mapping = 2 * 300 * (7 + 7)
+    assert operations == pytest.approx([paper, mapping, learned, mapping])
     assert all(row.fraction > 0 and row.cpu_seconds > 0 for row in rows)
     assert np.isnan(rows[0].bare_fraction)
     assert all(row.bare_fraction > 0 for row in rows[1:])
@@ -66,3 +74,17 @@ def test_operations_of_layers_are_two_for_each_weight_and_row(backward, times) -
     work = speed._products((4, 5), 10, backward=backward)
     assert work.operations == times * 2 * 10 * (3 * 4 + 4 * 5 + 5 * 3)
     work.run()
+
+
+def test_a_first_round_which_warms_up_is_not_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nor is a piece of work measured less often than it takes for a median of some use."""
+    now = [0.0]
+    spans = iter([100.0, *[2.0] * 99])
+    monkeypatch.setattr(speed.time, "perf_counter", lambda: now[0])
+    monkeypatch.setattr(speed.time, "process_time", lambda: now[0] / 2)
+
+    def run() -> None:
+        now[0] += next(spans)
+
+    times = speed._in_turn([Work(run, 1.0)])
+    assert times.tolist() == [[[2.0, 1.0]]] * speed.FEWEST_ROUNDS

@@ -2,10 +2,11 @@
 
 import io
 
+import pytest
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.commands.tables import entries
+from benchmarks.commands.tables import entries, print_table
 
 
 def shown(table) -> list[str]:
@@ -32,3 +33,13 @@ def test_twenty_letters_are_short():
     table = Table("name", "first")
     table.add_row("one", "x" * 20)
     assert shown(table) == ["one   first: " + "x" * 20]
+
+
+def test_a_pipe_gets_a_title_headings_and_a_line_for_each_row(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    table = Table("name", "first", title="All")
+    table.add_row("one", "1")
+    table.add_row("two", "")
+    print_table(table)
+    assert capsys.readouterr().out == "All\nname\tfirst\none\t1\ntwo\t\n"

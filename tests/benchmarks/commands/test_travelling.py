@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from benchmarks import __main__ as commands
 from benchmarks.cases.builtin import BUILTIN
+from benchmarks.commands import travelling
+from benchmarks.store.recomputing import Verified
 from benchmarks.store.results import Store
 from parapoint import console
 
@@ -82,3 +86,71 @@ def test_wrong_use_is_one_line_and_writes_nothing(arguments, tmp_path, monkeypat
     assert shown.err.startswith("error: ")
     assert shown.err.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("count", "said"),
+    [
+        (0, ["no differences"]),
+        (1, ["1 difference"]),
+        (22, ["and 2 more differences", "22 differences"]),
+    ],
+)
+def test_the_status_says_whether_anything_differs(
+    count: int, said: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = Verified(rows=3, maps=2, values=9, faults=[f"fault {n}" for n in range(count)])
+    monkeypatch.setattr(travelling.recomputing, "verify", lambda *_: found)
+    assert command("verify", "x.zip") == bool(count)
+    faults = [f"fault {n}" for n in range(min(count, 20))]
+    said[-1] = f"x.zip: 3 rows, 2 maps, 9 values computed anew: {said[-1]}"
+    assert capsys.readouterr().out.splitlines() == [*faults, *said]
+
+
+def test_the_measuring_of_maps_is_told_every_ten_seconds_and_at_its_end(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    now = iter([0.0, 0.0, 9.0, 10.0, 19.0, 21.0, 22.0])
+    monkeypatch.setattr(travelling.time, "monotonic", lambda: next(now))
+    told = travelling._Told()
+    told(0, 0)  # nothing to measure
+    for done in (1, 2, 3, 4, 5):
+        told(done, 5)
+    assert capsys.readouterr().err.splitlines() == [
+        "measured 2/5 (0:00:10)",
+        "measured 4/5 (0:00:21)",
+        "measured 5/5 (0:00:22)",
+    ]
+
+
+def test_a_merge_tells_which_answers_stay_and_what_is_older_than_versions(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = travelling.merging.Merged(
+        rows=4, same=2, contested=["cone, slim, seed 0: b"], unversioned={"paper": 3}
+    )
+    monkeypatch.setattr(travelling.merging, "merge", lambda *_: found)
+    assert command("merge", "a", "b", "--out", "c") == 0
+    assert capsys.readouterr().out.splitlines() == [
+        "c: 4 rows, 2 of them in several alike",
+        "the first answer stays: cone, slim, seed 0: b has another",
+        "3 rows of paper are older than versions of suites: theirs is not known",
+        "report: python -m reports c",
+    ]
+
+
+def test_rows_of_own_files_are_counted_as_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def publish(_: Path, archive: Path) -> travelling.publishing.Published:
+        archive.write_bytes(bytes(1_500_000))
+        return travelling.publishing.Published(3, 2, 1)
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(travelling.publishing, "publish", publish)
+    assert command("publish", "out") == 0
+    assert capsys.readouterr().out.splitlines() == [
+        f"{tmp_path}/out.zip: 3 rows, 2 maps, 1.5 MB",
+        "left out: 1 rows of files that are not public",
+        f"check it: python -m benchmarks verify {tmp_path}/out.zip",
+    ]

@@ -340,6 +340,33 @@ def test_percentiles_by_hand():
     assert distortion.percentile(np.array([]), 95) == np.inf
 
 
+BEND = np.pi / 4 - np.arctan(0.5)
+"""By how much the two acute angles of half a square change if the square is stretched to 2 x 1."""
+
+
+@pytest.mark.parametrize(
+    ("metric", "squares", "stretched", "value"),
+    [
+        ("quasi_conformal_p95", 20, 1, 1),  # exactly 95 % of the area keep their shape
+        ("quasi_conformal_p95", 19, 1, 2),
+        ("angle_difference_p95", 40, 3, 0),  # two corners of three change: 5 % of all
+        ("angle_difference_p95", 39, 3, BEND),
+    ],
+)
+def test_a_twentieth_may_be_worse_than_the_95th_percentile(
+    metric: str, squares: int, stretched: int, value: float
+) -> None:
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])
+    corners = np.array([[0, 1, 2], [0, 2, 3]])
+    at = np.arange(squares)
+    faces = (corners + 4 * at[:, None, None]).reshape(-1, 3)
+    factor = np.where(at < stretched, 2.0, 1.0)[:, None, None] * [1, 0] + [0, 1]
+    points = (square + 3.0 * at[:, None, None] * [1, 0]).reshape(-1, 2)
+    uv = (square * factor + 3.0 * at[:, None, None] * [1, 0]).reshape(-1, 2)
+    values = evaluate(in_plane(points, faces), Parameterization(uv, faces))
+    assert_allclose(values[metric], value, atol=EXACT)
+
+
 def test_a_face_degenerate_in_uv_is_infinite_counted_and_left_out_of_means():
     points = np.array([[0, 0], [1, 0], [0, 1], [1, 1.0], [2, 0], [2, 1]])
     faces = np.array([[0, 1, 2], [1, 3, 2], [1, 4, 3], [4, 5, 3]])
@@ -383,3 +410,15 @@ def test_slivers_and_tiny_triangles_are_not_degenerate():
     assert not found.degenerate_3d.any()
     assert not found.degenerate_uv.any()
     assert_allclose(found.sigma2, 1, rtol=1e-6)  # of a sliver, 1e-9 of whose digits are noise
+
+
+def test_the_distortion_of_some_faces_is_that_of_these_alone() -> None:
+    # The second triangle is drawn three times as large: alone it is an isometry.
+    points = np.array([[0, 0], [1, 0], [0, 1], [3, 0], [4, 0], [3, 1], [9, 9], [9, 9], [9, 9.0]])
+    faces = np.arange(9).reshape(3, 3)  # the last has no area and never counts
+    uv = np.concatenate([points[:3], 3 * points[3:6], points[:3] + 20])
+    of = triangles(in_plane(points, faces), Parameterization(uv, faces))
+    some = face_distortion(of, np.array([False, True, True]))
+    assert some.faces.tolist() == [1]
+    assert_allclose([some.area[0], some.sigma1[0], some.sigma2[0]], 1, rtol=EXACT)
+    assert face_distortion(of).faces.tolist() == [0, 1]

@@ -305,3 +305,28 @@ def test_a_part_of_a_map_is_flipped_where_the_whole_is():
     assert part.flipped.tolist() == [True]  # alone it would be its own majority
     assert validity.flipped_uv_area_fraction(part) == 1
     assert validity.overlap_area(part) == 0 < validity.overlap_area(state)
+
+
+def test_rows_of_a_flat_sheet_are_sound_at_its_rim_too() -> None:
+    """So are rows of two sheets apart; not the one at which two faces meet by a corner alone."""
+    points, faces = strip(4, 3)
+    apart = np.concatenate([points, points + 9])
+    for uv, corners in ((points, faces), (apart, np.concatenate([faces, faces + len(points)]))):
+        angle = igl.internal_angles(lifted(uv), corners)
+        sign = np.ones(len(corners), dtype=np.int64)
+        assert overlap.sound_fans(Parameterization(uv, corners), sign, angle).all()
+    bow = np.array([[0, 0], [1, 0], [1, 1], [-1, 0], [-1, -1.0]])
+    tie = np.array([[0, 1, 2], [0, 3, 4]])
+    angle, sign = igl.internal_angles(lifted(bow), tie), np.ones(2, dtype=np.int64)
+    found = overlap.sound_fans(Parameterization(bow, tie), sign, angle)
+    assert found.tolist() == [False, True, True, True, True]
+
+
+@pytest.mark.parametrize(("depth", "overlapped"), [(1e-11, 0), (1e-9, 1)])
+def test_a_strip_that_rounding_could_make_is_no_overlap(depth: float, overlapped: int) -> None:
+    """Two triangles side by side, the one `depth` inside the other: a share of twice as much."""
+    right = [[0, 0], [1, 0], [0, 1]]
+    left = [[depth, 0], [depth, 1], [-1, 0]]
+    values = evaluate(*own_rows([right, left]))
+    assert values["overlapped_fraction"] == overlapped
+    assert values["bijective"] == 1 - overlapped

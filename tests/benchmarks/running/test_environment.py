@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import psutil
 import pytest
 
@@ -64,3 +65,19 @@ def test_the_processor_has_a_name_wherever_it_is_told(cpuinfo, known, expected, 
     monkeypatch.setattr(environment.platform, "processor", lambda: known)
     monkeypatch.setattr(environment.platform, "machine", lambda: "arm64")
     assert environment.processor.__wrapped__() == expected
+
+
+@pytest.mark.parametrize(("counted", "cores"), [(6, 6), (None, 1)])
+def test_where_a_process_has_no_cores_of_its_own_all_count(
+    counted: int | None, cores: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(environment.os, "sched_getaffinity", raising=False)
+    monkeypatch.setattr(environment.os, "cpu_count", lambda: counted)
+    assert environment.cores() == cores
+
+
+def test_packages_that_the_project_asks_for_have_their_versions() -> None:
+    packages = environment._packages()
+    assert packages["numpy"] == np.__version__
+    assert packages["parapoint"]
+    assert not any(set(name) & set("<>=[; ") for name in packages)

@@ -203,6 +203,8 @@ def test_an_index_out_of_reach_is_said():
         "no index of packages could be reached"
     )
     assert environments._reason("Traceback:\nImportError: no\n\n") == "ImportError: no"
+    assert environments._reason("first\nsecond\nlast\n") == "last"
+    assert environments._reason("the only line") == "the only line"
     assert environments._reason("") == "pip failed"
 
 

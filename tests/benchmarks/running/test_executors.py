@@ -206,6 +206,17 @@ def test_a_missing_package_is_said_with_how_to_get_it(tmp_path, monkeypatch):
         executors.executor("slurm", tmp_path, jobs=1, memory=1, tick=lambda: None)
 
 
+def test_slurm_alone_needs_the_package_that_talks_to_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        executors.importlib.util, "find_spec", lambda name: None if "jobqueue" in name else name
+    )
+    with pytest.raises(InputError, match="the executor slurm needs the package dask_jobqueue"):
+        executors.executor("slurm", tmp_path, jobs=1, memory=1, tick=lambda: None)
+    executors.executor("dask://here:1", tmp_path, jobs=1, memory=1, tick=lambda: None)
+
+
 def test_a_scheduler_that_does_not_answer_is_one_line(tmp_path, monkeypatch):
     monkeypatch.setattr(cluster, "CONNECT_SECONDS", 0.2)
     hands = executors.executor("dask://127.0.0.1:9", tmp_path, jobs=1, memory=1, tick=lambda: None)

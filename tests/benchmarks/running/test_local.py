@@ -130,7 +130,8 @@ def test_the_output_of_the_cell_before_does_not_count(tmp_path, monkeypatch):
 def test_the_time_of_methods_is_theirs_or_that_of_the_whole_cell_where_they_fail(
     tmp_path, monkeypatch
 ):
-    outcomes = [Outcome("failed", seconds=1.0, took=9.0), Outcome("failed", took=4.0)]
+    known = [Outcome("failed", seconds=1.0, took=9.0), Outcome("failed", took=4.0)]
+    outcomes = [*known, Outcome("failed")]  # of the last nobody knows
 
     class Told(Local):
         def run(self, tasks, _):
@@ -138,7 +139,7 @@ def test_the_time_of_methods_is_theirs_or_that_of_the_whole_cell_where_they_fail
                 task.ended(outcome, Path())
 
     monkeypatch.setattr(executors, "Local", Told)
-    suite = Suite("trial", "A trial", ("cone",), ("tutte",), (0, 1))
+    suite = Suite("trial", "A trial", ("cone",), ("tutte",), (0, 1, 2))
     summary = runner.run(suite, tmp_path, jobs=2)
     assert summary.method_seconds == (1 + 4) / 2  # two at a time
 

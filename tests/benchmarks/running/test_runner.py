@@ -704,3 +704,26 @@ def test_what_did_not_end_well_runs_again_only_where_it_may_end_better(
 ):
     row = ResultRow("id", "trial", CASE, "slow", {}, 0, "source", "surface", status)
     assert planning.changed(row, row, Store(tmp_path), [HERE | there], HERE) == why
+
+
+@pytest.mark.parametrize("number", [-1, 1, 2])
+def test_a_row_of_a_run_that_nobody_knows_was_made_elsewhere(tmp_path: Path, number: int) -> None:
+    row = ResultRow("id", "trial", CASE, "slow", {}, 0, "source", "surface", "failed", run=number)
+    why = planning.changed(row, row, Store(tmp_path), [HERE], HERE)
+    assert why == "failed in another environment"
+
+
+def test_a_limit_of_memory_holds_for_metrics_on_other_machines_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Here a map may need more to be measured than the limit that its method had to keep."""
+    limits: list[float | None] = []
+    monkeypatch.setattr(runner, "_measure", lambda _, __, memory, *___: limits.append(memory))
+    monkeypatch.setattr(planning, "plan", lambda *_: ([], []))
+    monkeypatch.setattr(
+        executors, "executor", lambda _, folder, *, tick, **__: executors.Local(folder, 1, tick)
+    )
+    suite = Suite("trial", "A trial", ("cone",), ("tutte",))
+    for name in ("local", "dask://somewhere:1"):
+        run(suite, tmp_path, executor=name, memory=1.5)
+    assert limits == [None, 1.5]

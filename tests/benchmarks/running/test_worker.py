@@ -7,13 +7,15 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 
 from baselines import registry
-from benchmarks.running import cell, worker
+from benchmarks.running import cell, limits, worker
 from benchmarks.running.environment import ROOT
 from benchmarks.running.tasks import Outcome, Prepared, Ready, RunJob, from_json, to_json
 from benchmarks.store.archives import read_map, read_surface
@@ -103,7 +105,13 @@ def test_a_row_says_what_was_done_to_the_surface_before_and_in_which_component_i
         "automatic cut to a disk (1 of 2 components)"
     )
     receive, send = os.pipe()
+    loads = iter([0.5, 2.0])  # before and after
+    monkeypatch.setattr(cell, "load", lambda: next(loads, None))
+    began, used = time.monotonic(), time.process_time()
     outcome = cell.run(job, send)
+    assert 0 < outcome.seconds < time.monotonic() - began
+    assert 0 <= outcome.cpu_seconds < time.process_time() - used + 0.05  # the system's grain
+    assert outcome.load == 2.0
     assert worker._said(os.read(receive, 4096)) == (steps, None)
     assert (outcome.status, outcome.preprocessing) == ("ok", steps)
     mesh, result = read_surface(store.surface_path(surface)), read_map(tmp_path / "map.npz")
@@ -140,13 +148,14 @@ def test_a_message_counts_only_if_it_is_whole():
 
 @pytest.mark.parametrize("forks", [True, False])
 def test_a_supervisor_does_one_cell_after_another(tmp_path, forks):
-    """Where forking is not safe, a fresh interpreter does the same."""
+    """Where forking is not safe, a fresh interpreter does the same, without what is imported."""
     if forks and not worker.FORKS:
         pytest.skip("no forks on this system")
     with Store(tmp_path).writing():
         surface = Store(tmp_path).add_surface(TRIANGLE)
     name = f"Still{forks}"  # plugins stay for the process: each needs a name of its own
     (tmp_path / "plugin.py").write_text(
+        "import sys\n"
         "from dataclasses import dataclass\n"
         "from typing import ClassVar\n"
         "from parapoint import Parameterization\n"
@@ -154,7 +163,7 @@ def test_a_supervisor_does_one_cell_after_another(tmp_path, forks):
         f"class {name}:\n"
         "    requires: ClassVar[frozenset[str]] = frozenset()\n"
         "    def parameterize(self, surface, *, seed):\n"
-        "        print('hello')\n"
+        "        print('a fork:', 'benchmarks.running.worker' in sys.modules)\n"
         "        return Parameterization(surface.vertices[:, :2] + seed, surface.faces)\n"
     )
     plugin = f"{tmp_path}/plugin.py:{name}"
@@ -195,8 +204,60 @@ def test_a_supervisor_does_one_cell_after_another(tmp_path, forks):
             assert outcome.status == "ok", outcome
             np.testing.assert_array_equal(read_map(tmp_path / "map.npz").uv, UV + seed)
     printed, _ = process.communicate(timeout=30)
-    assert printed == b"hello\nhello\n"
+    assert printed.decode() == f"a fork: {forks}\n" * 2
     assert process.returncode == 0
+
+
+SLEEPER = """
+import os, time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+@dataclass(frozen=True)
+class Sleeper:
+    requires: ClassVar[frozenset[str]] = frozenset()
+
+    def parameterize(self, surface, *, seed):
+        Path(__file__).with_name("cell").write_text(f"{os.getpid()} ")
+        time.sleep(60)
+"""
+
+
+@pytest.mark.skipif(not limits.FORKS, reason="a fork is told of it, another process is not")
+def test_a_supervisor_ends_with_its_cell_once_the_run_is_gone(tmp_path: Path) -> None:
+    with Store(tmp_path).writing():
+        surface = Store(tmp_path).add_surface(TRIANGLE)
+    (tmp_path / "plugin.py").write_text(SLEEPER)
+    plugin = f"{tmp_path}/plugin.py:Sleeper"
+    spec = registry.register_plugin(plugin)
+    (tmp_path / "work").mkdir()
+    job = RunJob(
+        spec=spec,
+        plugins=(plugin,),
+        seed=0,
+        source_hash=registry.source_hash(registry.method(spec)[1]),
+        surface=Store(tmp_path).surface_path(surface),
+        folder=tmp_path,
+        time_limit=60.0,
+        memory_limit=1e9,
+    )
+    receive, send = os.pipe()
+    command = [sys.executable, "-m", "benchmarks.running.worker", str(send)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, pass_fds=[send], cwd=ROOT) as process:
+        os.close(send)
+        with os.fdopen(receive, "rb") as replies:
+            assert from_json(replies.readline(), Ready) == Ready()
+            assert process.stdin is not None
+            process.stdin.write(to_json(job))
+            process.stdin.flush()
+            end = time.monotonic() + 20
+            while not (note := tmp_path / "cell").exists() or not note.read_text().endswith(" "):
+                assert time.monotonic() < end, "the cell has not begun"
+                time.sleep(0.01)
+            process.stdin.close()
+            assert process.wait(10) == 1
+    assert not psutil.pid_exists(int(note.read_text()))
 
 
 def test_a_map_that_cannot_be_written_is_the_machine_s_fault(tmp_path, monkeypatch):
@@ -260,3 +321,30 @@ def test_a_supervisor_parses_a_plugin_and_does_not_run_it(tmp_path):
 @pytest.mark.parametrize("spec", ["mine(step=1)", "no spec (", "tutte"])
 def test_a_supervisor_leaves_faults_of_a_spec_or_a_plugin_to_the_cell(spec):
     worker._parse.__wrapped__(spec, ("missing.py:Mine",))
+
+
+@pytest.mark.skipif(not limits.FORKS, reason="no such thing on this system")
+def test_a_process_ends_with_its_parent_even_where_that_is_killed() -> None:
+    code = (
+        "import os, time; from benchmarks.running.limits import end_with\n"
+        "parent = os.getpid()\n"
+        "if not os.fork():\n"
+        "    end_with(parent); print(os.getpid(), flush=True)\n"
+        "time.sleep(60)"
+    )
+    command = [sys.executable, "-c", code]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as parent:
+        assert parent.stdout is not None
+        child = psutil.Process(int(parent.stdout.readline()))
+        parent.kill()
+    end = time.monotonic() + 5
+    while child.is_running() and child.status() != psutil.STATUS_ZOMBIE:
+        assert time.monotonic() < end, "it goes on"
+        time.sleep(0.01)
+
+
+@pytest.mark.skipif(not limits.FORKS, reason="no such thing on this system")
+def test_a_process_whose_parent_has_ended_before_ends_at_once() -> None:
+    code = "from benchmarks.running.limits import end_with; end_with(-1); print('goes on')"
+    ended = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, check=False)
+    assert (ended.returncode, ended.stdout) == (1, b"")

@@ -15,11 +15,20 @@ from benchmarks.store.archives import (
     arrays_hash,
     map_arrays,
     read_arrays,
+    read_map,
+    read_surface,
+    surface_arrays,
+    trace_arrays,
     write_arrays,
 )
 from parapoint.errors import InputError
 from parapoint.files.decoding import allow
-from parapoint.surfaces.parameterization import Parameterization, TracePoint
+from parapoint.surfaces.parameterization import (
+    Parameterization,
+    PointParameterization,
+    TracePoint,
+)
+from parapoint.surfaces.surface import PointCloud
 
 from .conftest import FLAT
 
@@ -29,6 +38,40 @@ def test_a_map_has_the_same_hash_whatever_its_trace():
     assert arrays_hash(map_arrays(traced)) == arrays_hash(map_arrays(FLAT))
     moved = Parameterization(FLAT.uv + 1e-15, FLAT.corners)
     assert arrays_hash(map_arrays(moved)) != arrays_hash(map_arrays(FLAT))
+
+
+def test_a_trace_comes_back_with_its_values_and_maps_where_it_has_them(tmp_path: Path) -> None:
+    trace = (
+        TracePoint(0, 0.5, {"energy": 3.0}, FLAT.uv + 1),
+        TracePoint(2, 1.5, {"energy": 2.0, "flips": 0.0}),
+    )
+    path = tmp_path / "map.npz"
+    write_arrays(path, map_arrays(FLAT) | trace_arrays(trace))
+    found = read_map(path, {"a": 1})
+    assert found.report == {"a": 1}
+    assert [point[:3] for point in found.trace] == [point[:3] for point in trace]
+    np.testing.assert_array_equal(found.trace[0].uv, FLAT.uv + 1)
+    assert found.trace[1].uv is None
+
+
+def test_clouds_and_their_maps_come_back_with_all_that_they_have(tmp_path: Path) -> None:
+    points, colours = np.eye(3), np.arange(9, dtype=np.uint8).reshape(3, 3)
+    for normals, attributes in ((None, {}), (points[::-1], {"colours": colours})):
+        cloud = PointCloud(points, normals, attributes=attributes)
+        write_arrays(tmp_path / "cloud.npz", surface_arrays(cloud))
+        found = read_surface(tmp_path / "cloud.npz")
+        assert isinstance(found, PointCloud)
+        assert (found.normals is None) == (normals is None)
+        assert found.normals is None or (found.normals == points[::-1]).all()
+        assert {name: value.tolist() for name, value in found.attributes.items()} == {
+            name: value.tolist() for name, value in attributes.items()
+        }
+    image = PointParameterization(points[:, :2], report={"a": 1})
+    write_arrays(tmp_path / "map.npz", map_arrays(image))
+    again = read_map(tmp_path / "map.npz", image.report)
+    assert isinstance(again, PointParameterization)
+    assert again.report == {"a": 1}
+    assert read_map(tmp_path / "map.npz").report == {}
 
 
 def test_a_pickle_is_never_opened(tmp_path):

@@ -55,6 +55,11 @@ def test_the_identity_covers_every_part_and_no_order():
     assert identity(**cell | {"params": {"y": [1, 2], "x": 1}}) == first
     others = [identity(**cell | {name: 7}) for name in cell]
     assert len({first, *others}) == 8
+    rows = [
+        ResultRow(first, status="ok", **cell | {"params": params})
+        for params in ({"x": 1, "y": (1, 2)}, {"y": [1, 2], "x": 1})
+    ]
+    assert rows[0].cell == rows[1].cell
 
 
 @pytest.mark.parametrize("tail", [b'{"id": "1', b"\0" * 40, b"\0\0\n", b"[]\n", b"null\n{}\n"])

@@ -135,7 +135,8 @@ def test_a_name_that_cannot_be_shown_is_refused(maps, name):
 
 
 @pytest.mark.parametrize(
-    "name", ["../../x", "slim", "__import__('os')", "<script>", "{{ 7 * 7 }}", "a,b(c=1)", "'"]
+    "name",
+    ["../../x", "slim", "__import__('os')", "<script>", "{{ 7 * 7 }}", "a,b(c=1)", "'", "x" * 80],
 )
 def test_a_name_is_text_and_never_code_or_path(maps, tmp_path, name):
     before = set(tmp_path.parent.iterdir())

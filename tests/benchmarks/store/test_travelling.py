@@ -7,6 +7,7 @@ import hashlib
 import io
 import json
 import zipfile
+from pathlib import Path
 
 import pytest
 
@@ -24,6 +25,7 @@ from benchmarks.store import (
 from benchmarks.store.results import Store
 from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import Parameterization
+from parapoint.surfaces.surface import PointCloud
 
 from .conftest import add
 
@@ -67,6 +69,31 @@ def test_a_row_without_a_surface_needs_none_and_one_that_is_there_stays(tmp_path
     assert place.read_bytes() == b"what was there"
 
 
+def test_all_files_of_a_surface_come_with_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From the rows' own folder, byte by byte; where that lacks them, from the model."""
+    here = write(tmp_path / "a", "wavy_sheet")
+    (row,) = here.rows()
+    mesh, result = flat()
+    here.add_reference(row.surface_hash, result)
+    here.add_exact(row.surface_hash, exact := PointCloud(mesh.vertices))
+    there = Store(tmp_path / "b")
+    assert publishing.supply_surfaces(here, there, [row]) == {}
+    files = [[path.read_bytes() for path in of.paths_of(row.surface_hash)] for of in (here, there)]
+    assert files[0] == files[1]
+
+    nothing, made = Store(tmp_path / "c"), Store(tmp_path / "d")
+    monkeypatch.setattr(publishing.models, "reference", lambda _: result)
+    monkeypatch.setattr(publishing.models, "exact_points", lambda _: exact)
+    private = dataclasses.replace(row, case="/home/me/sheet.obj")
+    faults = publishing.supply_surfaces(nothing, made, [private])
+    assert "is not the one that these rows were computed on" in faults[private.case]
+    assert not any(path.exists() for path in made.paths_of(row.surface_hash))
+    assert publishing.supply_surfaces(nothing, made, [row]) == {}
+    assert [path.read_bytes() for path in made.paths_of(row.surface_hash)] == files[0]
+
+
 def scores(store, rows):
     return {row.id: measuring.row_metrics(store, row) for row in rows}, {}
 
@@ -83,6 +110,7 @@ def test_publishing_twice_changes_no_byte_and_time_none(tmp_path, archive):
 def test_an_archive_holds_rows_maps_metrics_environment_and_hashes(archive):
     with zipfile.ZipFile(archive) as content:
         names = content.namelist()
+        assert {info.external_attr >> 16 for info in content.infolist()} == {0o644}
         manifest = json.loads(content.read("manifest.json"))
         for name, digest in manifest["sha256"].items():
             assert hashlib.sha256(content.read(name)).hexdigest() == digest
@@ -93,6 +121,14 @@ def test_an_archive_holds_rows_maps_metrics_environment_and_hashes(archive):
     suite = SUITES["builtin"]
     assert manifest["suites"] == {"builtin": {f"{suite.version} ({suite.digest})": 2}}
     assert set(manifest["models"]) == {"wavy_sheet", "cone"}
+    assert list(manifest) == sorted(manifest)  # by name, in whatever order they are made
+    with publishing.opened(archive) as store:
+        surfaces = {row.case: row.surface_hash for row in store.rows()}
+    assert manifest["models"]["cone"] == {
+        "surfaces": [surfaces["cone"]],
+        "sha256": "",
+        "licence": "made in memory",
+    }
 
 
 def test_a_published_archive_is_verified(archive):
@@ -122,6 +158,27 @@ def test_a_map_in_place_of_another_is_named(archive):
     forge(archive, members)
     found = recomputing.verify(archive, scores)
     assert sum("is not the map that was written" in fault for fault in found.faults) == 2
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"format": publishing.FORMAT + 1}, "was written by a newer version"),
+        ({"format": "new"}, "has no manifest that can be read"),
+        ({"format": publishing.FORMAT}, None),
+    ],
+)
+def test_an_archive_of_a_newer_version_is_refused(
+    change: dict[str, object], said: str | None, archive: Path
+) -> None:
+    members = unsealed(archive)
+    manifest = json.loads(members["manifest.json"]) | change
+    forge(archive, members | {"manifest.json": json.dumps(manifest).encode()})
+    if said is None:
+        assert recomputing.verify(archive, scores).faults == []
+        return
+    with pytest.raises(InputError, match=said):
+        recomputing.verify(archive, scores)
 
 
 def unsealed(archive):

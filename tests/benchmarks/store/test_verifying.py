@@ -10,7 +10,10 @@ from benchmarks.store.archives import (
     map_arrays,
     write_arrays,
 )
-from parapoint.surfaces.parameterization import Parameterization
+from benchmarks.store.results import Store
+from benchmarks.store.rows import ResultRow
+from parapoint.surfaces.parameterization import Parameterization, PointParameterization
+from parapoint.surfaces.surface import PointCloud
 
 from .conftest import FLAT, SQUARE, add
 
@@ -43,9 +46,21 @@ def exchanged_surface(store, row):
     write_arrays(store.surface_path(row.surface_hash), arrays)
 
 
+def damaged_reference(store: Store, row: ResultRow) -> None:
+    store.add_reference(row.surface_hash, FLAT)
+    store.reference_path(row.surface_hash).write_bytes(b"PK")
+
+
+def damaged_exact(store: Store, row: ResultRow) -> None:
+    store.add_exact(row.surface_hash, PointCloud(SQUARE.vertices))
+    store.exact_path(row.surface_hash).write_bytes(b"PK")
+
+
 @pytest.mark.parametrize(
     ("damage", "says"),
     [
+        (damaged_reference, "references/"),
+        (damaged_exact, "exact/"),
         (damaged_map, "damaged"),
         (exchanged_map, "is not the map that was written"),
         (shortened_map, "has 1 rows for 2 faces"),
@@ -59,6 +74,14 @@ def test_check_finds_what_is_wrong_with_a_file(store, damage, says):
     assert not list(verifying.faults(store))
     damage(store, row)
     assert any(says in fault for fault in verifying.faults(store))
+
+
+def test_check_counts_the_points_of_a_cloud(store: Store) -> None:
+    cloud = PointCloud(SQUARE.vertices)
+    add(store, PointParameterization(SQUARE.vertices[:, :2]), cloud)
+    assert not list(verifying.faults(store))
+    add(store, PointParameterization(SQUARE.vertices[:3, :2]), cloud, seed=1)
+    assert any("has 3 rows for 4 faces or points" in fault for fault in verifying.faults(store))
 
 
 def test_check_finds_a_row_that_was_edited(store):

@@ -7,6 +7,7 @@ from scipy.spatial import cKDTree
 
 from parapoint.surfaces.parameterization import Charted, Parameterization
 from parapoint.surfaces.surface import Mesh
+from parapoint.textures import packing
 from parapoint.textures.packing import packed
 
 CHARTS = 30
@@ -137,6 +138,43 @@ def test_charts_of_very_different_sizes_keep_their_scale_and_distance(spread) ->
     assert ratio.max() == pytest.approx(ratio.min(), rel=1e-6)
     assert filled(made) > 0.6
     assert gap_between_charts(made) > 0.75 / 256
+
+
+def test_many_like_charts_fill_the_square_as_if_set_in_rows() -> None:
+    """400 squares, each turned: 20 a row, each with a room of 1/256 of the whole."""
+    rng = np.random.default_rng(0)
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    angles = rng.uniform(0, 2 * np.pi, 400)
+    uv = np.concatenate(
+        [square @ [[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]] for a in angles]
+    )
+    corners = np.concatenate([np.array([[0, 1, 2], [0, 2, 3]]) + 4 * k for k in range(400)])
+    made = packed(flat(uv, corners)).map
+    # 20 sides and 21 rooms make the square; the shelves may need one more row or column.
+    least, most = (((1 - (n + 1) / 256) / n) ** 2 * 400 for n in (21, 20))
+    assert least - 0.01 < filled(made) < most + 0.01
+    assert gap_between_charts(made) > 0.9 / 256
+
+
+@pytest.mark.parametrize("resolution", [512, 724, 1024])
+def test_the_layout_that_fills_the_square_best_counts(monkeypatch, resolution) -> None:
+    """Whichever grid it comes from: xatlas's layouts are in texels of theirs."""
+    real = packing._packed
+
+    def spoilt(held, border, grid):
+        uv = real(held, border, grid)
+        if grid != resolution:
+            uv = uv + grid * (np.arange(len(uv)) // 4 == 0)[:, None]  # one chart far away
+        return uv
+
+    best = [real(flags().map, 1 / 256, resolution)]
+    monkeypatch.setattr(packing, "_packed", spoilt)
+    made = packed(flags()).map
+    sides = np.linalg.norm(made.uv[1::4] - made.uv[::4], axis=1)
+    alone = np.linalg.norm(best[0][1::4] - best[0][::4], axis=1)
+    places = (made.uv - made.uv.mean(axis=0)) / sides[0]
+    expected = (best[0] - best[0].mean(axis=0)) / alone[0]
+    assert np.linalg.norm(places, axis=1) == pytest.approx(np.linalg.norm(expected, axis=1))
 
 
 def test_a_corner_of_flat_faces_alone_stays_at_its_chart() -> None:

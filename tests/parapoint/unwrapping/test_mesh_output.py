@@ -377,8 +377,9 @@ def test_instances_are_refused_before_any_work(tmp_path) -> None:
         output.check(force=False)
 
 
-def test_colours_of_vertices_are_painted(tmp_path) -> None:
-    source, out = tmp_path / "old.ply", tmp_path / "new.glb"
+@pytest.mark.parametrize("ending", [".ply", ".obj"])
+def test_colours_of_vertices_are_painted(ending, tmp_path) -> None:
+    source, out = tmp_path / f"old{ending}", tmp_path / "new.glb"
     points, quads = grid()
     vertex = [f"{x} {y} {z} {40 * round(x)} {40 * round(y)} 7" for x, y, z in points]
     names = [*"xyz", "red", "green", "blue"]
@@ -386,6 +387,9 @@ def test_colours_of_vertices_are_painted(tmp_path) -> None:
     header += [f"property {'double' if n in 'xyz' else 'uchar'} {n}" for n in names]
     header += [f"element face {len(quads)}", "property list uchar int vertex_indices", "end_header"]
     faces = ["4 " + " ".join(map(str, quad)) for quad in quads]
+    if ending == ".obj":
+        header, vertex = [], [f"v {row}" for row in vertex]
+        faces = ["f " + " ".join(str(at + 1) for at in quad) for quad in quads]
     source.write_text("\n".join([*header, *vertex, *faces]) + "\n")
     written(source, out)
     picture = tmp_path / "new.png"

@@ -12,8 +12,9 @@ from benchmarks.metrics.evaluation import evaluate
 from parapoint import clock
 from parapoint.computed.reconstruction import ReconstructionError
 from parapoint.planar import coarse, descent
+from parapoint.planar.descent import sound
 from parapoint.planar.domains import FlatteningError
-from parapoint.surfaces.cutting import cut_to_disk
+from parapoint.surfaces.cutting import cut_along, cut_to_disk, disk_cut
 from parapoint.surfaces.surface import Mesh
 from parapoint.testing import irregular_disk, sphere
 from parapoint.unwrapping import unwrap
@@ -67,6 +68,28 @@ def test_of_two_starts_the_map_of_less_energy_and_seam_stays(runs, mesh, price) 
     costs = [run.energy + price * seam_of(run, mesh) for run in runs]
     best = runs[int(np.argmin(costs))]
     np.testing.assert_array_equal(made.corners, best.mesh.faces)
+
+
+def test_a_surface_with_two_rims_is_opened_from_one_to_the_other(runs) -> None:
+    """A band around a ball: seams that grow from its rims were longer and opened it less."""
+    ball = builtin.sphere_cap(160, rings=7)
+    band = sound(Mesh(ball.vertices, ball.faces[(ball.faces > 0).all(axis=1)]))
+    assert len(band.boundary_loops) == 2
+    made = Unwrap().parameterize(band, seed=0)
+    assert len(runs) == 3
+    shortest = _map_along(band, disk_cut(band))
+    assert made.report["end_energy"] <= shortest.energy
+    costs = [run.energy + seam_of(run, band) for run in runs]
+    assert costs[1] <= shortest.energy + seam_of(shortest, band)
+    assert made.report["end_energy"] == runs[int(np.argmin(costs))].energy
+
+
+def _map_along(mesh: Mesh, seam) -> descent.Run:
+    """The settled map of a mesh cut along some edges."""
+    run = descent.Run(cut_along(mesh, mesh.edges[seam]))
+    run.begin()
+    run.improve()
+    return run
 
 
 def test_under_a_bound_the_shortest_of_three_seams_stays(monkeypatch, runs) -> None:

@@ -111,6 +111,34 @@ def test_other_hardware_is_said_and_its_times_and_rounding_are_not_judged(tmp_pa
     assert made.blocks[0][0]["seconds"] == pytest.approx(9.0)
 
 
+def test_times_on_machines_that_nobody_knows_are_not_judged(tmp_path):
+    before, after = ([(HAND, "slim", [0.3], {"seconds": seconds})] for seconds in (1.0, 9.0))
+    found = Comparison(
+        folder(tmp_path / "before", *before, machine={"cores": 2}),
+        folder(tmp_path / "after", *after, machine={"cores": 2}),
+    )
+    assert found.machines == {}
+    assert not found.same_hardware
+    assert found.times == []
+
+
+def test_a_package_that_came_or_went_is_told(tmp_path):
+    cells = [(HAND, "slim", [0.3], {})]
+    known = [{"numpy": "1", "same": "4", "gone": "3"}, {"numpy": "2", "same": "4", "new": "5"}]
+    found = Comparison(
+        *(
+            folder(tmp_path / str(side), *cells, machine=MACHINE | {"packages": packages})
+            for side, packages in enumerate(known)
+        )
+    )
+    assert found.machines == {
+        "numpy": ("1", "2"),
+        "gone": ("3", "unknown"),
+        "new": ("unknown", "5"),
+    }
+    assert found.same_hardware
+
+
 def test_times_move_beyond_a_quarter_and_a_tenth_of_a_second(tmp_path):
     def cells(short, long, other):
         return [

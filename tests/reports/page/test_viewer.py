@@ -171,6 +171,15 @@ def test_a_shape_is_given_to_a_65535th_of_its_size():
     np.testing.assert_allclose(light[faces], sky[mesh.faces.reshape(-1)[corner]], atol=1 / 255)
 
 
+def test_a_shape_is_seen_whole_by_its_camera():
+    mesh = Mesh([[0, 0, 0], [3, 0, 0], [3, 4, 0], [3, 4, 12]], [[0, 1, 2], [0, 2, 3]])
+    camera = camera_on(mesh, np.eye(3)[2], np.eye(3)[1])
+    facts, _ = viewer.shape(mesh, camera, np.ones((4, 2)))
+    assert facts["size"] == 13  # the diagonal of 3 by 4 by 12
+    assert facts["centre"] == camera.centre.tolist()
+    assert facts["half"] == camera.half.max() > camera.half.min()
+
+
 def data(mesh, result):
     """A map, and what is read of it."""
     found = Map(mesh, result)
@@ -265,8 +274,11 @@ def test_levels_of_a_scale():
 
 
 def test_a_large_model_is_left_out_and_said(monkeypatch):
-    monkeypatch.setattr(viewer, "LARGEST", 10)
     mesh = sheet()
     camera = camera_on(mesh, np.eye(3)[2], np.eye(3)[1])
+    monkeypatch.setattr(viewer, "LARGEST", 128)
+    assert "box" in viewer.shape(mesh, camera, np.ones((81, 2)))[0]
+    assert "box" in data(mesh, flat(mesh))[1]
+    monkeypatch.setattr(viewer, "LARGEST", 127)
     assert viewer.shape(mesh, camera, np.ones((81, 2))) == ({"large": 128}, {})
     assert data(mesh, flat(mesh))[1] == {"large": 128}

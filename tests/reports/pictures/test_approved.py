@@ -1,4 +1,4 @@
-"""What the figures of small suites show: every axis, line, word and picture, and where it stands.
+"""What the figures of small suites show: every axis, tick, line, word and picture, and its place.
 
 `tests/golden/figures` holds it, figure by figure, to three digits.
 """
@@ -8,6 +8,7 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib.axis import Axis
 from matplotlib.collections import Collection
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
@@ -41,10 +42,24 @@ def shown(made: Figure) -> list[str]:
         )
         for one in place.get_children():
             lines += [f"  {line}" for line in artist(one)]
-    for one in [*made.texts, *made.legends]:
-        lines += artist(one)
-        lines += [f"  {text.get_text()!r}" for text in getattr(one, "get_texts", list)()]
+        if place.axison:
+            seen = [name for name, line in place.spines.items() if line.get_visible()]
+            lines.append(f"  lines: {' '.join(seen)}")
+            lines += [f"  {axis(one)}" for one in (place.xaxis, place.yaxis)]
+    lines += [line for one in made.texts for line in artist(one)]
+    for legend in made.legends:
+        lines.append(f"legend{' in a frame' * legend.get_frame_on()}")
+        lines += [f"  {one.get_text()!r}, {one.get_size():.3g} pt" for one in legend.get_texts()]
     return lines
+
+
+def axis(one: Axis) -> str:
+    """What stands along an axis: its label, its ticks, and whether lines go on from these."""
+    label, ticks = one.get_label(), one.get_ticklabels()
+    words = " ".join(repr(text.get_text()) for text in [label, *ticks])
+    sizes = said(sorted({text.get_size() for text in [label, *ticks]}))
+    grid = ", a grid" * any(line.get_visible() for line in one.get_gridlines())
+    return f"{one.axis_name}: {words}, {sizes} pt{grid}"
 
 
 def artist(one) -> list[str]:
@@ -57,6 +72,9 @@ def artist(one) -> list[str]:
         return [f"{one.get_text()!r} {place} {alike}"] if one.get_text() else []
     if isinstance(one, Line2D):
         kind = f"{one.get_linestyle()} {one.get_linewidth():.3g} {one.get_marker()}"
+        if one.get_marker() not in {"None", "", None}:
+            filled = "hollow" if one.get_markerfacecolor() == "none" else "filled"
+            kind += f" {one.get_markersize():.3g} {filled}"
         known = f"{to_hex(one.get_color())} {one.get_label()!r} {one.get_alpha()}"
         return [f"line {kind} {known}: {said(one.get_xdata())}; {said(one.get_ydata())}"]
     if isinstance(one, Collection):

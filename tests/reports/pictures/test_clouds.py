@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from benchmarks.metrics.pointwise import point_map
 from benchmarks.rendering.camera import camera
 from benchmarks.rendering.maps import FIELDS, Map, normal_colours
 from benchmarks.rendering.scene import Scene
@@ -111,7 +112,9 @@ def test_a_cloud_is_seen_with_its_normals_or_without():
     cloud, result = waves()
     normals = np.tile([0.0, 0, 1], (400, 1))
     for one in (cloud, PointCloud(cloud.points, normals)):
-        made = clouds.Portrait(one, 64, 2, FIELDS).map(result, ("cloud-uv", "dense", "seams"))
+        portrait = clouds.Portrait(one, 64, 2, FIELDS)
+        assert list(portrait.model()) == ["mesh-1", "mesh-2"]
+        made = portrait.map(result, ("cloud-uv", "dense", "seams"))
         assert list(made) == ["cloud-uv", "dense", "seams"]
         covered = {kind: int((image[..., 3] > 0).sum()) for kind, image in made.items()}
         assert 0.2 * covered["dense"] < covered["seams"] < 0.95 * covered["dense"]
@@ -119,6 +122,56 @@ def test_a_cloud_is_seen_with_its_normals_or_without():
         blue = shades[:, 2] > shades[:, 0] + 40  # of the two tones of the board, both are there
         assert 0.2 < blue.mean() < 0.8
         assert greens(made["seams"]) == 0
+
+
+def test_a_point_has_one_colour_in_space_and_in_the_plane():
+    """A flat square has one normal: no light changes the colour that stands for it."""
+    mesh = Mesh(sheet().vertices * [1, 1, 0], sheet().faces)
+    points = surface_points(mesh, 400).positions
+    cloud = PointCloud(points, np.tile([0.0, 0, 1], (400, 1)))
+    portrait = clouds.Portrait(cloud, 64, 2, FIELDS)
+    for made in (
+        drawn(mesh, flat(mesh))[1],
+        portrait.map(PointParameterization(points[:, :2]), ("cloud", "cloud-uv")),
+    ):
+        one, two = (made[kind][made[kind][..., 3] == 255] for kind in ("cloud", "cloud-uv"))
+        np.testing.assert_allclose(np.median(one, axis=0), np.median(two, axis=0), atol=2)
+
+
+@pytest.mark.parametrize("height", [10, -10])
+def test_normals_that_nobody_gave_point_out_of_a_cloud_wherever_it_lies(height):
+    """Those of a cap of a sphere are the sphere's own."""
+    normals = surface_points(ball(), 600).positions
+    normals = normals[normals[:, 2] > 0.3]
+    portrait = clouds.Portrait(PointCloud(normals + np.array([0, 0, height])), 16, 1, FIELDS)
+    assert np.median((portrait._normals * normals).sum(axis=1)) > 0.9
+
+
+@pytest.mark.parametrize(("fields", "side"), [(2, np.sqrt(2) / 2), (50, 5 / 19)])
+@pytest.mark.parametrize("scale", [1.0, 3.0])
+def test_a_field_on_a_cloud_is_a_share_of_its_diagonal_but_holds_five_points(fields, side, scale):
+    """A square of 20 by 20 points, mapped as it is or enlarged: fields grow with it."""
+    points = np.stack(np.meshgrid(*[np.arange(20) / 19] * 2), axis=2).reshape(-1, 2)
+    cloud = PointCloud(np.pad(points, ((0, 0), (0, 1))))
+    portrait = clouds.Portrait(cloud, 16, 1, fields)
+    found = point_map(cloud, PointParameterization(scale * points))
+    assert portrait._field(found) / np.ptp(found.uv[:, 0]) == pytest.approx(side)
+
+
+def test_a_checkerboard_begins_with_a_light_field_on_meshes_and_on_clouds():
+    """Fields as large as the map, which lies in the first."""
+    mesh = sheet()
+    scene = Scene(mesh)
+    view = scene.view(camera(mesh, np.eye(3)[2], np.eye(3)[1]), 32, 1)
+    colours = normal_colours(scene, view.camera)
+    cloud, result = waves()
+    portrait = clouds.Portrait(cloud, 32, 1, 0.5)
+    for image in (
+        clouds.images(view, Map(mesh, flat(mesh)), colours, 0.1, 400)["dense"],
+        portrait.map(result, ("dense",))["dense"],
+    ):
+        red, _, blue, _ = image[image[..., 3] == 255].astype(int).T
+        assert not (blue > red + 40).any()  # as the dark fields are
 
 
 def test_where_a_map_of_a_cloud_tears_is_green():

@@ -2,13 +2,31 @@ import json
 import shutil
 
 import numpy as np
+import pytest
 from PIL import Image as Images
 
 from benchmarks.metrics import validity
+from benchmarks.rendering.scene import Scene
+from benchmarks.rendering.viewpoints import two_cameras
+from benchmarks.store.rows import ResultRow
+from parapoint.errors import InputError
+from parapoint.surfaces.parameterization import PointParameterization
 from reports.contents import contents
 from reports.pictures import drawing, figures
 from reports.pictures.drawing import draw, known_keys
-from reports.pictures.names import ARTIST_PICTURES, map_file, model_file, slug
+from reports.pictures.names import (
+    ARTIST_PICTURES,
+    CLOUD_PICTURES,
+    CURVES,
+    HEAT_PICTURES,
+    TEXTURED_PICTURES,
+    VIEWED,
+    map_file,
+    map_kinds,
+    model_file,
+    slug,
+)
+from reports.pictures.portraits import Portrait
 
 from ..conftest import HAND, HOSTILE, NEFERTITI, Writer, flat, sheet
 
@@ -29,13 +47,44 @@ def test_pictures_are_drawn_once_and_again_when_something_changed(results, tmp_p
     stamps = {name: (tmp_path / name).stat().st_mtime_ns for name in files}
     (tmp_path / files[0]).unlink()
     record = tmp_path / "keys.json"
-    record.write_text(json.dumps(json.loads(record.read_text()) | {"gone.webp": "0"}))
+    record.write_text(
+        json.dumps(json.loads(record.read_text()) | dict.fromkeys(("gone.webp", "lost.webp"), "0"))
+    )
     (tmp_path / "gone.webp").touch()  # of a cell that gave way
     draw(suite, tmp_path, 1)
     assert not (tmp_path / "gone.webp").exists()
     other = [name for name in files if name.split(".")[0] != files[0].split(".")[0]]
     assert {name: (tmp_path / name).read_bytes() for name in files} == before
     assert all((tmp_path / name).stat().st_mtime_ns == stamps[name] for name in other)
+
+
+@pytest.mark.parametrize(
+    ("method", "case", "with_heat", "kinds"),
+    [
+        ("lscm", HAND, True, (*TEXTURED_PICTURES, *HEAT_PICTURES, CURVES, VIEWED)),
+        ("lscm", HAND, False, ("checker-1", "layout", VIEWED)),
+        ("slim", HAND, False, (*TEXTURED_PICTURES, VIEWED)),
+        ("parapoint", HAND, False, (*TEXTURED_PICTURES, *CLOUD_PICTURES, VIEWED)),
+        ("parapoint", "no paper's", False, (*TEXTURED_PICTURES, VIEWED)),
+        (
+            "parapoint",
+            "no paper's",
+            True,
+            (*TEXTURED_PICTURES, *HEAT_PICTURES, CURVES, *CLOUD_PICTURES, VIEWED),
+        ),
+    ],
+)
+def test_a_map_has_the_pictures_that_some_figure_or_page_shows(method, case, with_heat, kinds):
+    row = ResultRow("i", "s", case, method, {}, 0, "", "", "ok")
+    assert map_kinds(row, points=False, with_heat=with_heat) == kinds
+    assert map_kinds(row, points=True, with_heat=with_heat) == CLOUD_PICTURES
+
+
+def test_a_map_of_another_surface_is_not_drawn():
+    portrait = Portrait(sheet(3), 16)
+    for other in (flat(sheet(5)), PointParameterization(sheet(3).vertices[:, :2])):
+        with pytest.raises(InputError, match="the map is not of this mesh"):
+            portrait.map(other, ("layout",))
 
 
 def test_the_largest_work_comes_first(results, tmp_path, monkeypatch):
@@ -91,6 +140,23 @@ def test_a_damaged_map_is_told_and_the_rest_drawn(results, tmp_path):
     assert len(faults) == 1
     assert "damaged" in faults[0]
     assert len(list((tmp_path / "pictures").glob("*.webp"))) == 3 * 2 + 6 * 7 + 3 * 4
+
+
+def test_the_viewer_first_looks_from_where_the_first_picture_was_taken():
+    mesh = sheet(3)
+    first, second = two_cameras(Scene(mesh))
+    facts, _ = Portrait(mesh, 16).model()[VIEWED]
+    assert facts["axes"] == first.axes.tolist() != second.axes.tolist()
+
+
+def test_a_model_that_could_not_be_had_does_not_keep_the_next_from_being_drawn(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        writer.cell("gone", None, "lscm", {}, status="skipped")
+        writer.cell("here", sheet(3), "lscm", {}, status="failed")
+    assert draw(contents(tmp_path)[0], tmp_path / "pictures", 1) == []
+    names = {path.name for path in (tmp_path / "pictures").glob("*.webp")}
+    assert names == {"here.mesh-1.webp", "here.mesh-2.webp"}
 
 
 def test_the_artist_s_map_is_drawn_where_a_model_came_with_one(tmp_path):

@@ -5,7 +5,8 @@ import trimesh
 
 from parapoint.errors import InputError
 from parapoint.files.reading import read_parameterized
-from parapoint.surfaces.parameterization import Parameterization
+from parapoint.surfaces.parameterization import Parameterization, PointParameterization
+from parapoint.surfaces.surface import PointCloud
 from parapoint.testing import similar
 from reports.contents import contents
 from reports.pictures import exports
@@ -40,7 +41,11 @@ def test_other_programs_read_the_exports_back(tmp_path, mesh, result):
     np.testing.assert_array_equal(again.faces, mesh.faces)
     np.testing.assert_allclose(read.uv[read.corners], expected, atol=1e-15)
     shape = trimesh.load_mesh(tmp_path / "map.glb", process=False)
-    assert shape.visual.material.baseColorTexture.size == (1024, 1024)
+    material = shape.visual.material
+    assert material.baseColorTexture.size == (1024, 1024)
+    # Colours as they are, of no metal and no mirror, and on the back of an open mesh, too.
+    assert material.doubleSided
+    assert material.metallicFactor == 0 < material.roughnessFactor < 1
     np.testing.assert_allclose(shape.visual.uv[shape.faces], expected, atol=1e-6)
     np.testing.assert_allclose(shape.triangles, mesh.vertices[mesh.faces], atol=1e-6)
     lab = pymeshlab.MeshSet()
@@ -101,8 +106,11 @@ def test_exports_are_the_same_anywhere_and_in_any_unit(tmp_path, ending, shift, 
 def test_exports_are_written_once_and_faults_told(tmp_path):
     writer = Writer(tmp_path)
     with writer.store.writing():
-        row = writer.cell(HAND, sheet(), "lscm", {}, result=flat(sheet()))
         lost = writer.cell(HAND, sheet(), "slim", {}, result=flat(sheet(), 0.5))
+        writer.cell(HAND, sheet(), "arap", {}, status="failed")
+        cloud = PointCloud(sheet().vertices)
+        writer.cell("scan", cloud, "lscm", {}, result=PointParameterization(cloud.points[:, :2]))
+        row = writer.cell(HAND, sheet(), "lscm", {}, result=flat(sheet()))
     (tmp_path / lost.uv_file).unlink()
     suite = contents(tmp_path)[0]
     report = tmp_path / "report"

@@ -1,6 +1,9 @@
 import dataclasses
+import itertools
+import json
 import pickle
 from importlib import resources
+from types import SimpleNamespace
 
 import matplotlib as mpl
 import numpy as np
@@ -13,15 +16,17 @@ from pypdf import PdfReader
 from pypdf.generic import StreamObject
 
 from parapoint.surfaces.parameterization import Parameterization, TracePoint
+from parapoint.surfaces.preparation import CUT
 from reports import contents as contents_module
 from reports.contents import ANGLE, AREA, FLIPPED_OFF_SEAM, ISOMETRIC, SEAM, contents
+from reports.labels import Label
 from reports.pictures import curves as curves_module
 from reports.pictures import figures, galleries, plots
 from reports.pictures.curves import BINS, curves_of
 from reports.pictures.figures import draw, drawings, write
 from reports.pictures.galleries import leading
-from reports.pictures.names import CURVES, map_file
-from reports.pictures.printing import few_colours
+from reports.pictures.names import ARTIST_PICTURES, CURVES, map_file, model_file
+from reports.pictures.printing import few_colours, on_white
 from reports.pictures.style import (
     DARK_INK,
     DARK_PAPER,
@@ -81,18 +86,39 @@ def test_a_large_report_has_no_figure_for_each_model_and_those_of_before_go(
 ):
     small = contents(results)[0]
     assert not small.is_large
+    monkeypatch.setattr(contents_module, "SHEETS", len(small.cases))
+    assert not contents(results)[0].is_large
     monkeypatch.setattr(contents_module, "SHEETS", len(small.cases) - 1)
     large = contents(results)[0]
     assert large.is_large
     (gone, *_) = [one for one in drawings(small, tmp_path) if one.name.startswith("maps-")]
     assert gone.name not in [one.name for one in drawings(large, tmp_path)]
     kept = [one for one in drawings(large, tmp_path) if one.name == "pareto"]
-    monkeypatch.setattr(figures, "drawings", lambda given, _: [gone] * (given is small) + kept)
+    empty = dataclasses.replace(gone, name="maps-empty", figure=lambda: None)
+    before = [gone, empty, *kept]
+    monkeypatch.setattr(figures, "drawings", lambda given, _: before if given is small else kept)
     draw(small, tmp_path, tmp_path, 1)
     assert (tmp_path / f"{gone.name}.png").exists()
     draw(large, tmp_path, tmp_path, 1)
     names = sorted(file.name for file in tmp_path.glob("*.p*"))
     assert names == ["pareto-dark.png", "pareto.pdf", "pareto.png"]
+
+
+def test_a_figure_that_has_nothing_to_show_any_more_goes(tmp_path):
+    for made, count in ((figure(1, 1), 3), (None, 0), (None, 0)):
+        drawing = figures.Drawing("a", "T", "", (), lambda made=made: made)
+        write(tmp_path, False, drawing)
+        assert len(list(tmp_path.iterdir())) == count
+
+
+@pytest.mark.parametrize(
+    ("name", "coarse", "width"),
+    [("pareto", False, 80), ("pareto", True, 56), ("maps-x", False, 56), ("heat-x", False, 56)],
+)
+def test_sheets_of_pictures_and_large_reports_are_coarser(tmp_path, name, coarse, width):
+    write(tmp_path, coarse, figures.Drawing(name, "T", "", (), lambda: figure(2, 1)))
+    with Images.open(tmp_path / f"{name}.png") as image:
+        assert image.size == (width, width // 2)  # at 40 points an inch, or 28
 
 
 def test_the_same_results_give_the_same_bytes(suite, tmp_path):
@@ -103,6 +129,28 @@ def test_the_same_results_give_the_same_bytes(suite, tmp_path):
     for kind in ("pdf", "png"):
         one, two = ((tmp_path / name / f"pareto.{kind}").read_bytes() for name in ("one", "two"))
         assert one == two
+
+
+def test_the_leading_parameters_are_those_of_most_models_and_of_slim_the_isometric():
+    isometric = {"energy": "symmetric_dirichlet"}
+    known = {
+        "conformal": ("slim", {"energy": "conformal", "iterations": 50}, "ab"),
+        "one": ("slim", isometric | {"iterations": 1}, "ab"),
+        "twenty": ("slim", isometric | {"iterations": 20}, "ab"),
+        "few": ("parapoint", {"iterations": 50}, "a"),
+        "most": ("parapoint", {}, "ab"),
+    }
+    made = SimpleNamespace(
+        cases=["a", "b"],
+        methods=[
+            Label(method, json.dumps(params), method, "", short)
+            for short, (method, params, _) in known.items()
+        ],
+        shown=lambda case, label: "a row" if case in known[label.short][2] else None,
+    )
+    assert leading(made, "slim").short == "twenty"
+    assert leading(made, "parapoint").short == "most"
+    assert leading(made, "lscm") is None
 
 
 def test_the_supplements_figure_shows_slim_isometric_beside_parapoint(suite, tmp_path):
@@ -121,6 +169,56 @@ def test_the_closed_models_figure_says_what_cut_it_and_why_a_map_is_missing(suit
     assert not any("hand-made" in text for text in found)  # nefertiti has no map of its own
 
 
+def shown_pictures(monkeypatch):
+    """The boxes and pictures that the galleries' figures put, as they do."""
+    found = []
+    monkeypatch.setattr(galleries, "put", lambda _, box, picture: found.append((box, picture)))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("case", "artist", "heads"),
+    [
+        (HAND, False, ["(b) SLIM, uncut", "(c) ParaPoint, learned seam"]),
+        (HAND, True, ["(c) SLIM, uncut", "(d) ParaPoint, learned seam"]),
+        (f"{HAND}@drawn", False, ["(b) SLIM, drawn seam"]),
+    ],
+)
+def test_a_cut_is_named_and_shown_from_its_side(tmp_path, monkeypatch, case, artist, heads):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for method in ("slim", "parapoint"):
+            writer.cell(case, sheet(3), method, {}, result=flat(sheet(3)))
+    for kind in ARTIST_PICTURES if artist else ():
+        (tmp_path / model_file(case, kind)).touch()
+    found = shown_pictures(monkeypatch)
+    said = texts(galleries.cut_model(contents(tmp_path)[0], case, tmp_path))
+    assert set(heads) <= set(said)
+    assert ("(b) hand-made: the artist's map" in said) == artist
+    kinds = [picture.name.split(".")[-2] for _, picture in found]
+    view = "checker-2" if case.endswith("@drawn") else "checker-1"  # a drawn seam is behind
+    assert kinds == ["mesh-1", *ARTIST_PICTURES * artist, view, "layout", view, "layout"]
+
+
+@pytest.mark.parametrize(("preprocessing", "cut"), [("", "uncut"), (CUT, "automatic cut")])
+def test_a_missing_map_is_told_to_be_cut_where_others_are(tmp_path, preprocessing, cut):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for method in ("slim", "parapoint"):
+            writer.cell(HAND, None, method, {}, status="failed")
+        writer.cell(HAND, None, "lscm", {}, status="failed", preprocessing=preprocessing)
+    said = texts(galleries.cut_model(contents(tmp_path)[0], HAND, tmp_path))
+    assert {f"(b) SLIM, {cut}", "(c) ParaPoint, learned seam"} <= set(said)
+
+
+def test_values_that_are_not_finite_or_not_known_are_not_printed(suite):
+    row, *_ = suite.rows
+    assert galleries.values_text(suite, row).startswith("angle 0.1930   area ")
+    suite.measured[ANGLE] = np.inf
+    assert galleries.values_text(suite, row) == "no finite values"
+    assert galleries.values_text(suite, dataclasses.replace(row, id="another")) == ""
+
+
 def test_convergence_draws_the_quality_along_the_way(suite, tmp_path):
     made = plots.convergence(suite, tmp_path, suite.cases, ANGLE)
     panel = next(place for place in made.axes if place.get_title() == HAND)
@@ -136,9 +234,9 @@ def test_convergence_draws_the_quality_along_the_way(suite, tmp_path):
 def test_convergence_draws_each_seed_and_no_cell_that_failed(tmp_path):
     writer = Writer(tmp_path)
     with writer.store.writing():
+        writer.cell(HAND, sheet(), "slim", {}, status="timeout", seed=3)
         for seed in range(3):
             writer.cell(HAND, sheet(), "slim", {}, result=flat(sheet(), seed / 8), seed=seed)
-        writer.cell(HAND, sheet(), "slim", {}, status="timeout", seed=3)
     suite = contents(tmp_path)[0]
     (panel,) = plots.convergence(suite, tmp_path, [HAND], ANGLE).axes
     of_rows = suite.measured.set_index("seed")[ANGLE]
@@ -165,11 +263,45 @@ def test_flips_on_the_way_are_percents_of_the_faces_that_span_no_seam(tmp_path):
     assert 45 < first < 55
 
 
+def test_a_state_on_the_way_that_cannot_be_measured_is_passed_over(tmp_path):
+    mesh = sheet(3)
+    uv = flat(mesh).uv
+    way = (uv, np.full_like(uv, np.nan), uv)
+    trace = tuple(TracePoint(k, 1.0 + k, {}, one) for k, one in enumerate(way))
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        result = dataclasses.replace(flat(mesh), trace=trace)
+        row = writer.cell(HAND, mesh, "slim", {}, result=result)
+    assert curves_of(contents(tmp_path)[0], row, tmp_path).way[:, 0].tolist() == [1.0, 3.0]
+
+
 def test_losses_are_those_of_the_trace(suite):
     made = plots.losses(suite, suite.cases)
     assert [place.get_title() for place in made.axes] == [HAND, "mannequin-devil"]
     lines = {line.get_label(): line for line in made.axes[0].get_lines()}
     np.testing.assert_allclose(lines["total"].get_ydata(), [1, 1 / 2, 1 / 3])
+
+
+def test_a_loss_that_is_not_positive_is_not_drawn(tmp_path):
+    mesh = sheet(3)
+    trace = tuple(TracePoint(k, 1.0 + k, {"total": 1.0, "cycle": 0.5 * k - 0.5}) for k in range(3))
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        result = dataclasses.replace(flat(mesh), trace=trace)
+        writer.cell(HAND, mesh, "parapoint", {}, result=result)
+    (panel,) = plots.losses(contents(tmp_path)[0], [HAND]).axes
+    drawn = {line.get_label(): line.get_xydata().tolist() for line in panel.get_lines()}
+    assert drawn["cycle"] == [[2, 0.5]]
+    assert len(drawn["total"]) == 3
+
+
+def test_a_trace_of_one_point_has_no_losses(tmp_path):
+    mesh = sheet(3)
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        result = dataclasses.replace(flat(mesh), trace=flat(mesh).trace[:1])
+        writer.cell(HAND, mesh, "parapoint", {}, result=result)
+    assert plots.losses(contents(tmp_path)[0], [HAND]) is None
 
 
 def test_singular_values_of_an_isometry_peak_at_one(tmp_path):
@@ -247,6 +379,16 @@ def test_log_axes_have_plain_numbers():
     assert not any("10^" in text for text in shown)
 
 
+def test_small_numbers_along_an_axis_have_an_exponent():
+    made = figure(2, 2)
+    place = made.add_subplot()
+    place.plot([1, 2], [1e-6, 1e-3])
+    place.set_yscale("log")
+    plain_log(place.yaxis)
+    shown = {label.get_text() for label in place.yaxis.get_ticklabels()}
+    assert {"1e-6", "1e-5", "0.0001", "0.001"} <= shown
+
+
 def test_a_figure_of_many_models_goes_over_several_pages(suite):
     cases = [f"case {number}" for number in range(10)]
     made = figures.paged(suite, "n", "T", "C", make=len, cases=cases, size=4)
@@ -258,7 +400,39 @@ def test_a_figure_of_many_models_goes_over_several_pages(suite):
     assert {row.case for row in one.rows} == {HAND}
 
 
-def test_an_ablation_shows_every_variant_and_the_paper_s_four(tmp_path):
+def test_no_figure_has_more_models_than_a_page_holds(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        for number in range(13):
+            for rate in (0.1, 0.2):
+                writer.cell(f"m{number}", sheet(3), "parapoint", {"lr": rate}, status="failed")
+    suite = contents(tmp_path)[0]
+
+    figures_of = {}
+    for count in (3, 4, 7, 8, 9, 10, 12, 13):
+        rows = tuple(row for row in suite.rows if int(row.case[1:]) < count)
+        part = dataclasses.replace(suite, rows=rows, is_large=False)
+        figures_of[count] = {one.name for one in drawings(part, tmp_path)}
+    for name, most in (
+        *(("models", 12), ("disks", 7), ("clouds", 7), ("ablation", 3)),
+        *(("pareto", 9), ("seams", 9), ("convergence", 9), ("losses", 9), ("singular-values", 9)),
+    ):
+        assert name in figures_of[most]
+        assert f"{name}-2" not in figures_of[most]
+        assert f"{name}-2" in figures_of[most + 1]
+
+
+def test_a_model_without_a_map_has_no_sheet_and_the_next_one_has(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        writer.cell("one", sheet(3), "lscm", {}, status="failed")
+        writer.cell("two", sheet(3), "lscm", {}, result=flat(sheet(3)))
+    names = [one.name for one in drawings(contents(tmp_path)[0], tmp_path)]
+    sheets = [name for name in names if name.startswith(("maps-", "heat-"))]
+    assert sheets == ["maps-two", "heat-two"]
+
+
+def test_an_ablation_shows_every_variant_and_the_paper_s_four(tmp_path, monkeypatch):
     writer = Writer(tmp_path)
     changes = ({}, {"distortion": "isometric"}, {"branches": "2d"}, {"branches": "3d"})
     base = {"distortion": None, "branches": None, "distortion_weight": None}
@@ -274,6 +448,22 @@ def test_an_ablation_shows_every_variant_and_the_paper_s_four(tmp_path):
     four = texts(galleries.ablation_of_the_paper(suite, tmp_path))
     assert "(a) cube, conformal" in four
     assert "(d) eight, 3D→2D→3D alone" in four
+    found = shown_pictures(monkeypatch)
+    made = galleries.ablation_of_the_paper(suite, tmp_path)
+    kinds = [picture.name.split(".")[-2] for _, picture in found]
+    assert kinds == ["layout", "checker-1"] * 4
+    boxes = np.array([box for box, _ in found])
+    low, high = boxes[:, :2], boxes[:, :2] + boxes[:, 2:]
+    assert low.min() >= 0
+    assert high.max() <= 1 + 1e-9
+    width, height = made.get_size_inches()
+    np.testing.assert_allclose(boxes[:, 2] * width, boxes[:, 3] * height)  # each a square
+    for one, other in itertools.combinations(range(8), 2):
+        assert ((high[one] <= low[other] + 1e-9) | (high[other] <= low[one] + 1e-9)).any()
+    assert (low[::2, 1] > low[1::2, 1]).all()  # the layout above the texture
+    x, y = np.array([text.get_position() for text in made.texts]).T
+    np.testing.assert_allclose(x, (low + high)[::2, 0] / 2)  # each name in the middle of its pair,
+    assert 0 < y.min() <= y.max() < low[:, 1].min() < 0.5 / height  # a little below it
 
 
 def test_an_ablation_without_the_paper_s_cells_lacks_its_figure(suite, tmp_path):
@@ -293,6 +483,14 @@ def test_pictures_in_a_pdf_are_jpegs_of_their_size(tmp_path):
     assert document.metadata.title == "A <title>"
     # From the last row on; a colour stands for four pixels.
     np.testing.assert_allclose(np.asarray(picture.image.convert("RGB"))[::-1], smooth, atol=20)
+
+
+def test_a_picture_that_is_not_whole_is_printed_on_white():
+    clear, half, grey = [0, 0, 0, 0], [0, 0, 0, 128], [90, 90, 90, 255]
+    shown = on_white(np.array([[clear, half, grey]], dtype=np.uint8))
+    np.testing.assert_allclose(shown, [[[255] * 3, [127] * 3, [90] * 3]], atol=1)
+    for other in (shown, shown[..., 0]):
+        assert on_white(other) is other
 
 
 def test_only_the_pictures_of_a_pdf_are_not_deflated(tmp_path):
@@ -327,7 +525,8 @@ def test_all_pictures_of_a_figure_stand_in_one_pair_of_axes(tmp_path):
 
 
 def test_names_are_parted_at_spaces_hyphens_and_underscores():
-    assert wrapped("SLIM symmetric Dirichlet", 15) == "SLIM symmetric\nDirichlet"
+    for width in (14, 15, 22):
+        assert wrapped("SLIM symmetric Dirichlet", width) == "SLIM symmetric\nDirichlet"
     assert wrapped("nefertiti-lowres_odedstein", 20) == "nefertiti-lowres_\nodedstein"
     assert wrapped("beetle", 3) == "beetle"
 
@@ -355,11 +554,11 @@ def test_a_map_that_may_not_be_ranked_is_not_fit(tmp_path):
             writer.cell(HAND, sheet(), method, {}, result=flat(sheet(), 0.3))
     made = contents(tmp_path)[0]
     for short, grade, angle in (("LSCM", "collapsed", 0.3), ("ARAP", "broken", 1e-9)):
-        made.means.loc[made.means["label"] == short, ["grade", ANGLE]] = grade, angle
+        made.means.loc[made.means["label"] == short, ["grade", ANGLE, AREA]] = grade, angle, 0.0
     found = plots.trade_offs(made, HAND)
     assert found["fit"].to_dict() == {"LSCM": False, "ARAP": False, "SLIM": True}
-    assert found.loc["ARAP", ANGLE] == plots.LEAST_ANGLE
-    assert (found[AREA] >= 1e-3).all()  # an isometry would have 0, which has no logarithm
+    # An isometry has 0, which has no logarithm.
+    assert found.loc["ARAP", [AREA, ANGLE]].tolist() == [1e-3, 1e-4]
 
 
 def test_energies_stand_against_seams(tmp_path):
@@ -371,7 +570,7 @@ def test_energies_stand_against_seams(tmp_path):
     made.means.loc[made.means["label"] == "LSCM", [SEAM, ISOMETRIC]] = 1.5, 1e9
     (place,) = plots.seams(made, made.cases).axes
     drawn = {line.get_label(): tuple(line.get_xydata()[0]) for line in place.lines}
-    assert drawn["LSCM"] == (1.5, plots.MOST_ENERGY)
+    assert drawn["LSCM"] == (1.5, 20)  # as the caption says
     assert drawn["ARAP"][0] == 0
     assert 4 <= drawn["ARAP"][1] < plots.MOST_ENERGY
 
@@ -383,9 +582,13 @@ def test_a_power_law_goes_through_five_sizes_or_more(tmp_path, sizes, lines):
         for count in range(3, 3 + sizes):
             for twin in "ab":  # two models of each size
                 mesh = sheet(count)
-                writer.cell(f"{twin}{count}", mesh, "lscm", {}, result=flat(mesh), seconds=count)
+                given = {"result": flat(mesh), "seconds": 2.0 * len(mesh.faces)}
+                writer.cell(f"{twin}{count}", mesh, "lscm", {}, **given)
     (place,) = plots.cost(contents(tmp_path)[0]).axes
-    assert sum(line.get_linestyle() != "None" for line in place.lines) == lines
+    drawn = [line for line in place.lines if line.get_linestyle() != "None"]
+    assert len(drawn) == lines
+    for line in drawn:  # two seconds a face, from the smallest to the largest
+        np.testing.assert_allclose(line.get_xydata(), [[8, 16], [72, 144]])
 
 
 def test_all_panels_end_alike(suite):
@@ -427,6 +630,9 @@ def test_the_caption_of_the_clouds_says_what_was_done(tmp_path):
             params = {"preset": "paper", "points": 2048, "iterations": 300}
             report = {"points": points}
             writer.cell(case, sheet(), "parapoint", params, result=flat(sheet()), report=report)
+        few = {"report": {"points": 7}, "status": "failed"}  # of which no map is drawn
+        writer.cell("three", None, "parapoint", params, **few)
+        writer.cell("one", sheet(), "nuvo", {"points": 9000}, result=flat(sheet()))
     made = contents(tmp_path)[0]
     assert figures.points_told(made) == "500 to 2,048; paper, 300 iterations"
     (caption,) = [one.caption for one in drawings(made, tmp_path) if one.name == "clouds"]

@@ -6,12 +6,14 @@ import re
 from pathlib import Path
 from urllib.parse import unquote
 
+import numpy as np
 import pytest
 
 from benchmarks.cases.builtin import BUILTIN
 from benchmarks.store import publishing
 from parapoint import console
 from parapoint.errors import InputError
+from parapoint.surfaces.parameterization import Parameterization
 from reports import __main__ as commands
 from reports.site import building, markdown
 
@@ -46,12 +48,19 @@ def test_a_method_page_lists_the_models_after_one_that_lacks_it(tmp_path, monkey
     writer = Writer(tmp_path / "run")
     with writer.store.writing():
         writer.cell("a", sheet(), "slim", {}, result=flat(sheet()))
-        writer.cell("b", sheet(), "lscm", {}, result=flat(sheet()))
+        writer.cell("b", sheet(), "slim", {}, status="timeout")
+        folded = np.abs(flat(sheet()).uv - [0.3, 0])
+        writer.cell("b", sheet(), "lscm", {}, result=Parameterization(folded, sheet().faces))
     draw_small(monkeypatch)
     building.build([tmp_path / "run"], tmp_path / "out", jobs=1)
     (page,) = (tmp_path / "out" / "methods").glob("lscm*.html")
     models = {Path(one).stem for one in addresses(page) if "models/" in one}
     assert any(name.startswith("b") for name in models)
+    assert '<td class="text bad">broken</td>' in page.read_text(encoding="utf-8")
+    (page,) = (tmp_path / "out" / "methods").glob("slim*.html")
+    text = page.read_text(encoding="utf-8")
+    assert '<td class="text ">usable</td>' in text
+    assert '<td class="text bad">timeout</td>' in text
 
 
 def addresses(page: Path) -> set[str]:
@@ -74,7 +83,7 @@ def test_every_link_of_the_site_leads_to_a_file(built):
     assert found.cells == 6
     files = [path for path in (place / "out").rglob("*") if path.is_file()]
     assert found.size == sum(path.stat().st_size for path in files)
-    assert not [path for path in files if path.suffix == ".pdf"]
+    assert not [path for path in files if path.suffix == ".pdf" or ".angle." in path.name]
 
 
 def test_the_newest_cell_is_shown_and_the_history_says_what_moved(built):
@@ -87,6 +96,20 @@ def test_the_newest_cell_is_shown_and_the_history_says_what_moved(built):
     assert re.search(r'^"angle difference, mean",1.0,0.0,SLIM on b', table, re.MULTILINE)
     cells = (place / "out" / "tables" / "paper" / "cells.csv").read_text()
     assert len(cells.splitlines()) == 7
+
+
+def test_each_folder_is_compared_with_the_last_one_that_shares_a_cell(tmp_path):
+    folders = []
+    for name, cases in (("old", "ab"), ("new", "bc"), ("third", "a"), ("last", "b")):
+        writer = Writer(tmp_path / name)
+        with writer.store.writing():
+            for case in cases:
+                writer.cell(case, None, "slim", {}, status="failed")
+        folders.append(tmp_path / name)
+    assert building._history(folders, folders, tmp_path) == ["history/index.html"]
+    text = (tmp_path / "history" / "index.html").read_text(encoding="utf-8")
+    pairs = dict.fromkeys(re.findall(r"(\w+ to \w+): ", text))
+    assert list(pairs) == ["old to new", "old to third", "new to last"]
 
 
 def test_a_method_s_page_has_its_maps_with_lazy_pictures(built):
@@ -132,12 +155,13 @@ def test_a_site_of_nothing_or_in_the_way_or_too_large_is_refused(built, tmp_path
     with pytest.raises(InputError, match="in the way"):
         building.build([place / "old"], tmp_path / "mine", jobs=1)
     building.check_size(found)
+    building.check_size(building.Built(found.index, 100_000_000, 1))
     large = building.Built(found.index, 100_000_001, 1)
     with pytest.raises(InputError, match="has 100 MB, more than 100"):
         building.check_size(large)
 
 
-@pytest.mark.parametrize(("few", "told"), [(1, False), (5, True)])
+@pytest.mark.parametrize(("few", "told"), [(1, False), (2, True), (5, True)])
 def test_many_methods_leave_out_the_tables_with_a_value_for_each_map(
     built, few, told, tmp_path, monkeypatch
 ):
@@ -170,7 +194,7 @@ def test_the_page_of_markdown_names_command_commit_machine_and_load(built, tmp_p
     page = markdown.write([place / "old"], tmp_path / "RESULTS.md")
     text = page.read_text(encoding="utf-8")
     assert "python -m reports markdown DIR" in text
-    assert "Load while cells ran: 0.5 to 1.5." in text
+    assert "2 methods on 2 models: 4 cells, 4 maps. Load while cells ran: 0.5 to 1.5." in text
     assert "commit 0123456789ab, X, 2 cores" in text
     assert "### Overall: share of pairs won" in text
     assert "The machine was busy during 2 of 4 cells" in text

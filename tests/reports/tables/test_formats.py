@@ -1,4 +1,5 @@
 import csv
+import dataclasses
 import io
 import math
 import re
@@ -63,10 +64,18 @@ def test_a_long_latex_table_goes_over_several_pages():
     rows = [{"name": "x", "a": float(k)} for k in range(100)]
     text = latex(table(*rows, notes=("end",)))
     assert is_balanced(text)
-    assert text.count(r"\begin{table}") == text.count(r"\toprule") == 3
+    assert text.count(r"\begin{table}[p]") == text.count(r"\toprule") == 3
     assert text.count(r"\label") == text.count("C\\_1") == text.count("footnotesize end") == 1
     assert text.count("\nx & ") == 3  # what stands once stands once a page
     assert "99.00" in text
+
+
+@pytest.mark.parametrize(("lengths", "pages"), [((20, 25), 1), ((20, 26), 2), ((40, 46), 3)])
+def test_a_block_is_parted_only_where_it_is_longer_than_a_page(lengths, pages):
+    blocks = tuple(tuple({"name": "x", "a": 1.0} for _ in range(count)) for count in lengths)
+    text = latex(dataclasses.replace(table(), blocks=blocks))
+    assert text.count(r"\toprule") == pages
+    assert text.count(r"\begin{table}[t]") == (pages == 1)
 
 
 def test_latex_compiles(results, tmp_path):

@@ -1,4 +1,5 @@
 import json
+from types import SimpleNamespace
 
 import pytest
 
@@ -11,8 +12,10 @@ from reports.contents import (
     POINT_TEARS,
     contents,
 )
+from reports.labels import Label
 from reports.page.board import data
-from reports.tables.leaderboard import SHOWN, definition, glances, winner
+from reports.tables import leaderboard
+from reports.tables.leaderboard import SHOWN, Winner, definition, glances, winner
 from reports.tables.suites import comparison
 
 from ..conftest import DEVIL, HAND, HOSTILE, NEFERTITI, Writer, flat, sheet
@@ -55,12 +58,28 @@ def test_at_a_glance(suite):
     assert angles.next == ("ParaPoint on 1",)
 
 
+def test_a_glance_tells_the_second_and_the_best_of_ours_where_it_is_neither(monkeypatch):
+    won = {"a": "LATy", "b": "LAT", "c": "LA", "d": "L", "e": ""}  # the best of each model
+    methods = [("lscm", "L"), ("arap", "A"), ("tutte", "T"), ("parapoint", "x"), ("parapoint", "y")]
+    labels = [Label(method, "{}", method, "", short) for method, short in methods]
+    suite = SimpleNamespace(cases=list(won), methods=labels)
+    monkeypatch.setattr(
+        leaderboard,
+        "winner",
+        lambda _, case, __: Winner(tuple(won[case]), "") if won[case] else None,
+    )
+    first = glances(suite)[0]
+    assert (first.names, first.count, first.of, first.next) == (("L",), 4, 4, ("A on 3", "y on 1"))
+
+
 def test_the_cells_are_json_with_every_metric(suite):
     given = json.loads(json.dumps(data([suite]), allow_nan=False))
     names = [metric["name"] for metric in given["metrics"]]
     assert given["shown"] == [name for name in SHOWN if name in names]
     assert set(SHOWN).difference(names) == {POINT_ANGLE, POINT_AREA, POINT_COLLISIONS, POINT_TEARS}
     assert names[-2:] == ["seconds", "cpu_seconds"]
+    groups = {metric["name"]: metric["group"] for metric in given["metrics"]}
+    assert [groups[name] for name in (ANGLE, AREA, "seconds")] == ["angles", "areas", "cost"]
     (only,) = given["suites"]
     assert [model["name"] for model in only["models"]] == [HAND, DEVIL, NEFERTITI]
     assert len(only["cells"]) == len(suite.rows)
@@ -107,6 +126,15 @@ def test_the_page_shows_what_was_ranked_here(tmp_path):
         assert (medians["LSCM"][1:], medians["ARAP"][1:]) == ((0.2, "best"), (0.3, "second"))
         worst = shown(only["summaries"]["worst"][over])
         assert (worst["LSCM"][1:], worst["ARAP"][1:]) == ((0.9, "second"), (0.4, "best"))
+    # A digit for each pair, method by method: LSCM is behind ARAP on the last model alone.
+    assert only["won"]["areas"] == ["100212201", "100212201", "100210221"]
+    # Student's t at 97.5 % of one and of two degrees of freedom.
+    assert given["quantiles"] == [
+        None,
+        None,
+        pytest.approx(12.7062),
+        pytest.approx(4.3027, abs=1e-4),
+    ]
     first = shown([one["entries"] for one in only["models"][0]["maps"]])
     assert [first[name][2] for name in ("Tutte", "LSCM", "ARAP")] == ["", "best", "second"]
     assert winner(made, "a", AREA).names == ("LSCM",)

@@ -79,6 +79,14 @@ def test_a_cut_by_hand_is_not_compared_with_an_automatic_one(results):
     assert verdict.text == "not comparable: published: cut by hand"
 
 
+def test_a_broken_map_is_compared_with_no_figure(results):
+    suite = contents(results)[0]
+    suite.records[HAND, "ParaPoint"]["grade"] = "broken"
+    told = {v.figure.method: v.text for v in verdicts(suite) if v.case == HAND}
+    assert told["ParaPoint"] == "not comparable: our map is broken"
+    assert told["SLIM"].startswith("better: lower by ")
+
+
 def test_only_a_model_cut_along_a_drawn_seam_is_compared_with_one_cut_by_hand():
     drawn = f"{NEFERTITI}@drawn"
     assert published_values(drawn) == {"SLIM": 0.089}

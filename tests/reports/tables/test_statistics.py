@@ -1,9 +1,11 @@
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from reports.contents import contents
+from reports.contents import ANGLE, AREA, contents
+from reports.labels import Label
 from reports.tables.statistics import half_width, holm, pair, paired_tests, seed_variance
 from reports.tables.variants import ablation
 
@@ -24,6 +26,7 @@ def test_a_pair_by_hand():
 def test_a_pair_without_a_difference_has_no_p():
     assert math.isnan(pair(np.ones(6), np.ones(6)).p)
     assert pair(np.ones(1), np.zeros(1)).p == 1  # either sign is as likely
+    assert pair(np.array([1.0, 2]), np.array([2.0, 1])).p == 1  # and no p is above 1
     assert math.isnan(pair(np.ones(0), np.ones(0)).difference)
 
 
@@ -69,3 +72,12 @@ def test_paired_tests_over_five_models(tmp_path):
     assert row["angle_difference_mean wins"] == "5/5"
     assert row["angle_difference_mean p"] == pytest.approx(2 / 32)
     assert "below 0.062" in made.notes[0]
+
+
+def test_four_models_are_too_few_for_paired_tests():
+    records = {(case, name): {ANGLE: 0.1, AREA: 0.1} for case in "abcd" for name in "xy"}
+    methods = [Label(name, "{}", name, "", name) for name in "xy"]
+    suite = SimpleNamespace(
+        cases=list("abcd"), methods=methods, records=records, unranked=frozenset()
+    )
+    assert paired_tests(suite) is None

@@ -2,10 +2,14 @@ import math
 
 import pytest
 
-from reports.contents import contents
+from parapoint.surfaces.parameterization import PointParameterization
+from parapoint.surfaces.surface import PointCloud
+from reports.contents import ANGLE, contents
+from reports.tables import suites
+from reports.tables.bakes import bakes
 from reports.tables.formats import comma_separated
-from reports.tables.notes import load_notes
-from reports.tables.suites import comparison, conformality, failures, supplement
+from reports.tables.notes import BUSY, environment_note, load_notes
+from reports.tables.suites import comparison, conformality, everything, failures, supplement
 
 from ..conftest import DEVIL, HAND, HOSTILE, NEFERTITI, Writer, flat, sheet
 
@@ -88,6 +92,18 @@ def test_comparison_by_hand(tmp_path, name, arrow, worst, marks):
     assert [shown["LSCM"], shown["ARAP"]] == marks
 
 
+@pytest.mark.parametrize(("count", "shown"), [(0, "(0)"), (12, "m10, m11)"), (13, "(13)")])
+def test_few_common_models_are_named(results, monkeypatch, count, shown):
+    names = [f"m{number}" for number in range(count)]
+    monkeypatch.setattr(suites, "common_cases", lambda *_: names)
+    assert shown in comparison(contents(results)[0], [ANGLE]).caption
+
+
+def test_in_the_table_of_all_cells_only_names_are_words(results):
+    made = everything(contents(results)[0])
+    assert [column.key for column in made.columns if column.text] == ["case", "method", "status"]
+
+
 def test_failures_are_told_with_status_and_reason(results):
     made = failures(contents(results)[0])
     told = {row["status"]: row["reason"] for row in made.blocks[0]}
@@ -129,14 +145,38 @@ def test_fractions_are_per_cent_in_the_comparison_and_so_in_its_csv(tmp_path):
     assert comma_separated(made).splitlines()[1].split(",")[2] == "1.25"
 
 
+def test_only_the_runs_of_a_suite_are_told_and_what_is_not_known_of_them(tmp_path):
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        writer.store.add_run({"commit": "another", "cpu": "B"})
+        writer.store.add_run({"commit": "0123456789abcdef", "cpu": "A"})
+        writer.cell("a", None, "lscm", {}, status="failed", run=1)
+    assert environment_note(contents(tmp_path)[0]) == (
+        "Run on: commit 0123456789ab, A, ? cores, Python ?. Seeds: 0."
+    )
+
+
+def test_bakes_are_told_of_the_methods_that_bake(tmp_path):
+    cloud = PointCloud(sheet(4).vertices)
+    writer = Writer(tmp_path)
+    with writer.store.writing():
+        writer.cell("wavy", cloud, "lscm", {}, status="skipped")
+        for seed, psnr in enumerate((30.0, 33.0)):
+            report = {"bake_psnr": psnr, "bake_cpu_seconds": 1.0 + seed, "charts": 4}
+            result = PointParameterization(cloud.points[:, :2])
+            writer.cell("wavy", cloud, "textured", {}, seed=seed, result=result, report=report)
+    (row,) = bakes(contents(tmp_path)[0]).blocks[0]
+    assert (row["label"], row["bake_psnr"], row["bake_cpu_seconds"]) == ("Textured", 31.5, 1.5)
+
+
 def test_a_busy_machine_is_told_beside_the_times(tmp_path):
     writer = Writer(tmp_path)
     with writer.store.writing():
-        for case, load in (("a", 0.9), ("b", 3.24), ("c", None)):
+        for case, load in (("a", 0.9), ("b", 3.24), ("c", None), ("d", BUSY)):
             writer.cell(case, sheet(), "lscm", {}, result=flat(sheet()), load=load, cpu_seconds=0.2)
     suite = contents(tmp_path)[0]
     (note,) = load_notes(suite)
-    assert note.startswith("The machine was busy during 1 of 3 cells (up to 3.2 processes")
+    assert note.startswith("The machine was busy during 1 of 4 cells (up to 3.2 processes")
     assert all(note in made.notes for made in (supplement(suite), comparison(suite)))
     times = {
         row["name"]: row["mean"] for row in comparison(suite, ["seconds", "cpu_seconds"]).blocks[1]
