@@ -11,7 +11,7 @@ from parapoint.commands.output import SIDES, TEXTURE
 from parapoint.commands.progress import Tell, baking, untold
 from parapoint.files.gltf import opened
 from parapoint.files.gltf_rewriting import check_rewritable, rewrite_gltf
-from parapoint.files.materials import libraries
+from parapoint.files.materials import libraries, material_names
 from parapoint.files.mesh_writers import (
     write_material,
     write_npz,
@@ -20,7 +20,7 @@ from parapoint.files.mesh_writers import (
     write_textured,
 )
 from parapoint.files.obj_rewriting import rewrite_obj, write_library
-from parapoint.files.painting import Painting, Picture, painting_of
+from parapoint.files.painting import Painting, Picture, bare_name, painting_of
 from parapoint.files.ply_rewriting import has_strips, rewrite_ply
 from parapoint.files.reading import Polygons, faults_of
 from parapoint.files.targets import checked_target
@@ -142,7 +142,8 @@ class MeshOutput:
         named, has_pictures = libraries(self.source)
         material = None
         if not named:
-            material = write_material(self.out, picture)
+            names = material_names(self.source.read_bytes())[0][1:]
+            material = write_material(self.out, picture, [*names, *map(bare_name, names)])
         elif has_pictures:
             material = write_library(self.out, picture if self.shows_old else None, named)
         split = rewrite_obj(
