@@ -115,7 +115,8 @@ class MeshOutput:
         done = baking(tell)
         if self.painting is not None:
             chosen = self.painting if self.chosen is None else self.painting.of_faces(self.chosen)
-            return repainted(placed, chosen, self.texture, self.margin, done=done)
+            tints = self.source.suffix.lower() in {".glb", ".gltf"}
+            return repainted(placed, chosen, self.texture, self.margin, tints=tints, done=done)
         if self.given.colours is not None and self.chosen is None:
             return coloured(placed, self.given.colours, self.texture, self.margin, done=done)
         return checkerboard(CHECKER_FIELDS, max(1, self.texture // CHECKER_FIELDS))

@@ -59,6 +59,12 @@ def colours_of(values: npt.NDArray[Any]) -> npt.NDArray[Any] | None:
     return values.astype(np.uint8 if most <= 255 else np.uint16)
 
 
+def srgb(linear: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Parts of linear colours, from 0 to 1, as parts of sRGB."""
+    low = 12.92 * linear
+    return np.where(linear <= 0.0031308, low, 1.055 * np.maximum(linear, 0) ** (1 / 2.4) - 0.055)
+
+
 def unit_colours(colours: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
     """Colours (see `PointCloud`) as fractions."""
     most = 1.0 if colours.dtype.kind == "f" else float(np.iinfo(colours.dtype).max)

@@ -11,7 +11,6 @@ from PIL import Image
 
 from parapoint import InputError, Mesh, Parameterization
 from parapoint.commands.mesh_output import mesh_output
-from parapoint.commands.unwrapping import _one_each
 from parapoint.files.gltf import opened
 from parapoint.files.mesh_writers import write_glb, write_ply
 from parapoint.files.painting import painting_of
@@ -445,12 +444,3 @@ def test_one_colour_alone_is_no_painting(tmp_path) -> None:
     given = read_polygons(tmp_path / "a.glb")
     painting = painting_of(tmp_path / "a.glb", given.polygon_of, given.uv)
     assert painting.largest == 64
-
-
-def test_of_the_uvs_of_a_vertex_one_is_chosen_and_without_any_the_middle() -> None:
-    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [9, 9, 9]])
-    uv = np.array([[0.1, 0.1], [0.4, 0.1], [0.4, 0.4], [0.6, 0.6], [0.9, 0.9], [0.6, 0.9]])
-    placed = Charted(
-        Mesh(points, [[0, 1, 2], [0, 2, 3]]), Parameterization(uv, [[0, 1, 2], [3, 4, 5]])
-    )
-    assert_allclose(_one_each(placed).map.uv, [*uv[:3], uv[5], [0.5, 0.5]])

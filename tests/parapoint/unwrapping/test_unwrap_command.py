@@ -6,14 +6,15 @@ import math
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from PIL import Image
 
 from parapoint import cli, clock
 from parapoint.commands.telling import ADVICE_OF_MESHES, warn
-from parapoint.commands.unwrapping import Request, _advice, _warn_of_bound, expected
+from parapoint.commands.unwrapping import Request, _advice, _one_each, _warn_of_bound, expected
 from parapoint.files.reading import read_parameterized, read_surface
 from parapoint.surfaces.areas import LEAST_PART, MOST_STARVED
-from parapoint.surfaces.parameterization import Charted
+from parapoint.surfaces.parameterization import Charted, Parameterization
 from parapoint.surfaces.surface import Mesh
 from parapoint.testing import irregular_disk, sphere
 from parapoint.unwrapping import unwrap
@@ -195,6 +196,15 @@ def test_each_vertex_gets_one_uv_and_faces_and_figures_are_of_that(
     elif ending != "glb":
         with Image.open(tmp_path / "new.png") as picture:
             assert picture.size == (64, 64)
+
+
+def test_of_the_uvs_of_a_vertex_one_is_chosen_and_without_any_the_middle() -> None:
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [9, 9, 9]])
+    uv = np.array([[0.1, 0.1], [0.4, 0.1], [0.4, 0.4], [0.6, 0.6], [0.9, 0.9], [0.6, 0.9]])
+    placed = Charted(
+        Mesh(points, [[0, 1, 2], [0, 2, 3]]), Parameterization(uv, [[0, 1, 2], [3, 4, 5]])
+    )
+    assert_allclose(_one_each(placed).map.uv, [*uv[:3], uv[5], [0.5, 0.5]])
 
 
 def test_a_texture_that_an_obj_file_has_no_use_for_is_said(box, tmp_path, capsys, caplog) -> None:
