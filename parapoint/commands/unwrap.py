@@ -127,10 +127,19 @@ class Asked:
     per_vertex: bool
 
     def __post_init__(self) -> None:
-        check_choice("components", self.components, COMPONENTS)
-        check_whole("seed", self.seed, 0, LARGEST_SEED)
+        from parapoint.computed.parts import DISTORTIONS  # here, so that the help comes at once
+        from parapoint.planar.descent import LEAST_ENERGY
+
+        check_choice("--components", self.components, COMPONENTS)
+        check_whole("--seed", self.seed, 0, LARGEST_SEED)
         if self.time_budget is not None:
-            check_number("time_budget", self.time_budget, most=LONGEST_SECONDS, above=True)
+            check_number("--time-budget", self.time_budget, most=LONGEST_SECONDS, above=True)
+        if self.seam_price is not None:
+            check_number("--seam-price", self.seam_price)
+        if self.max_distortion is not None:
+            check_number("--max-distortion", self.max_distortion, LEAST_ENERGY, above=True)
+        if self.distortion is not None:
+            check_choice("--distortion", self.distortion, DISTORTIONS)
         unused: dict[str, object] = {
             "--seam-price": self.seam_price,
             "--max-distortion": self.max_distortion,
@@ -143,6 +152,11 @@ class Asked:
         if self.seam_price is not None and self.max_distortion is not None:
             raise InputError(
                 "--seam-price does not go with --max-distortion, which alone says how far to cut"
+            )
+        if self.max_distortion is not None and self.distortion in {"balanced", "conformal"}:
+            raise InputError(
+                f"--max-distortion bounds an energy that --distortion {self.distortion} gives up "
+                f"for angles: leave one of them out"
             )
         if self.seam_price is not None and self.distortion == "conformal":
             raise InputError("--seam-price does not go with --distortion conformal")

@@ -234,7 +234,7 @@ def test_other_formats(box, tmp_path, capsys, caplog) -> None:
         ("# none\n", [], "has no edge"),
         (NET, ["--max-distortion", "4.1"], "--max-distortion does not go with --seams"),
         (NET, ["--components", "largest"], "--components largest does not go with --seams"),
-        (NET, ["--components", "some"], "components must be one of"),
+        (NET, ["--components", "some"], "--components must be one of"),
     ],
 )
 def test_wrong_use_is_one_line(seams, more, message, box, capsys) -> None:
@@ -382,7 +382,10 @@ def test_no_part_collapses_however_dear_the_seam_is(distortion, height) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--distortion", "conformal", "--max-distortion", 4.5], "max_distortion bounds an energy"),
+        (
+            ["--distortion", "conformal", "--max-distortion", 4.5],
+            "--max-distortion bounds an energy",
+        ),
         (["--distortion", "conformal", "--seam-price", 1], "--seam-price does not go"),
         (["--max-distortion", 4.5, "--seam-price", 1], "--max-distortion, which alone says"),
         (["--distortion", "wavy"], "isometric"),
