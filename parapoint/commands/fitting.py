@@ -45,7 +45,12 @@ def estimator_of(preset: str, settings: dict[str, Any]) -> Estimator:
         from parapoint.learned.parapoint import ParaPoint
 
         model = ParaPoint(preset, **given)
-    model.check()
+    try:
+        model.check()
+    except InputError as error:
+        name, rest = str(error).split(maxsplit=1)
+        option = f"--{name.replace('_', '-')}" if name in given else name
+        raise InputError(f"{option} {rest}") from None
     return model
 
 

@@ -7,12 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from parapoint.commands.output import SIDES, TEXTURE
 from parapoint.commands.progress import Tell, baking, untold
+from parapoint.files.gltf import opened
 from parapoint.files.gltf_rewriting import check_rewritable, rewrite_gltf
-from parapoint.files.materials import libraries
+from parapoint.files.materials import libraries, material_names
 from parapoint.files.mesh_writers import (
     write_material,
     write_npz,
@@ -21,13 +20,12 @@ from parapoint.files.mesh_writers import (
     write_textured,
 )
 from parapoint.files.obj_rewriting import rewrite_obj, write_library
-from parapoint.files.painting import Painting, Picture, painting_of
+from parapoint.files.painting import Painting, Picture, bare_name, painting_of
 from parapoint.files.ply_rewriting import is_rewritable, rewrite_ply
-from parapoint.files.point_writers import write_points
 from parapoint.files.reading import Polygons, faults_of
 from parapoint.files.targets import checked_target
 from parapoint.surfaces.parameterization import Charted
-from parapoint.surfaces.surface import BoolArray, FloatArray, PointCloud
+from parapoint.surfaces.surface import BoolArray
 from parapoint.textures.baking import LARGEST
 from parapoint.textures.checkerboard import checkerboard
 from parapoint.textures.repainting import coloured, repainted
@@ -36,6 +34,8 @@ logger = logging.getLogger("parapoint")
 
 REWRITTEN = {(".obj", ".obj"), (".ply", ".ply"), (".glb", ".glb"), (".gltf", ".glb")}
 """Endings of an input and an output between which all but the UVs is kept."""
+WITHOUT_STRAYS = (".ply", ".glb")
+"""Endings of files that are written with the vertices of faces alone."""
 CHECKER_FIELDS = 32
 """Fields along a side of the checkerboard."""
 
@@ -53,7 +53,6 @@ class MeshOutput:
         asked: whether a texture was asked for.
         painting: what the file paints on its triangles, or None.
         chosen: (F,) the triangles that are written, or None for all.
-        per_vertex: whether each vertex is to have one uv.
     """
 
     given: Polygons
@@ -64,13 +63,12 @@ class MeshOutput:
     asked: bool
     painting: Painting | None
     chosen: BoolArray | None = None
-    per_vertex: bool = False
 
     @property
     def is_rewritten(self) -> bool:
         """Whether the file is copied with new UVs, and all else stays."""
         pair = (self.source.suffix.lower(), self.out.suffix.lower())
-        if pair not in REWRITTEN or self.chosen is not None or self.per_vertex:
+        if pair not in REWRITTEN or self.chosen is not None:
             return False
         return pair[0] != ".ply" or is_rewritable(self.source)
 
@@ -78,7 +76,7 @@ class MeshOutput:
     def has_picture(self) -> bool:
         """Whether a picture is written beside the file."""
         ending = self.out.suffix.lower()
-        if self.per_vertex or ending not in SIDES:
+        if ending not in SIDES:
             return False
         if self.is_rewritten and ending == ".obj":
             return self.shows_old or not libraries(self.source)[0]
@@ -101,22 +99,30 @@ class MeshOutput:
         if self.is_rewritten and self.out.suffix.lower() == ".glb":
             with faults_of(self.source):
                 check_rewritable(self.source)
+        if self.asked and not self._gets_texture:
+            why = "its own materials stay" if self.is_rewritten else "this format has none"
+            logger.warning("%s: no texture is written: %s", self.out, why)
+
+    @property
+    def _gets_texture(self) -> bool:
+        """Whether a texture of ours is written, beside the file or inside."""
+        if self.out.suffix.lower() != ".glb":
+            return self.has_picture
+        return not (self.is_rewritten and opened(self.source).tree.get("materials"))
 
     def picture(self, placed: Charted, tell: Tell = untold) -> Picture:
         """What the texture shows: what the file does, or a checkerboard."""
         done = baking(tell)
         if self.painting is not None:
             chosen = self.painting if self.chosen is None else self.painting.of_faces(self.chosen)
-            return repainted(placed, chosen, self.texture, self.margin, done=done)
+            tints = self.source.suffix.lower() in {".glb", ".gltf"}
+            return repainted(placed, chosen, self.texture, self.margin, tints=tints, done=done)
         if self.given.colours is not None and self.chosen is None:
             return coloured(placed, self.given.colours, self.texture, self.margin, done=done)
         return checkerboard(CHECKER_FIELDS, max(1, self.texture // CHECKER_FIELDS))
 
     def write(self, placed: Charted, picture: Picture) -> dict[str, object]:
         """Write the mesh with its map in the unit square; facts of the writing."""
-        if self.per_vertex:
-            write_points(self.out, PointCloud(placed.mesh.vertices), _one_each(placed))
-            return {}
         if self.is_rewritten:
             rewrite: dict[str, Callable[[Charted, Picture], dict[str, object]]] = {
                 ".obj": self._rewrite_obj,
@@ -137,7 +143,8 @@ class MeshOutput:
         named, has_pictures = libraries(self.source)
         material = None
         if not named:
-            material = write_material(self.out, picture)
+            names = material_names(self.source.read_bytes())[0][1:]
+            material = write_material(self.out, picture, [*names, *map(bare_name, names)])
         elif has_pictures:
             material = write_library(self.out, picture if self.shows_old else None, named)
         split = rewrite_obj(
@@ -176,13 +183,14 @@ class MeshOutput:
     @property
     def _keeper(self) -> str:
         """The ending of a file that would keep all but the UVs; "" for none."""
-        is_whole = self.chosen is None and not self.per_vertex
         own = self.source.suffix.lower()
-        return next((out for given, out in REWRITTEN if given == own and is_whole), "")
+        return next((out for given, out in REWRITTEN if given == own and self.chosen is None), "")
 
     def _warn_of_extras(self) -> None:
         shown = {"old UVs", "colours"} if self.painting is not None else {"colours"}
         left = [name for name in self.given.extras if name not in shown]
+        if self.out.suffix.lower() in WITHOUT_STRAYS and not self.given.mesh.referenced.all():
+            left.append("vertices without faces")
         if left:
             logger.warning(
                 "%s: positions, triangles, new UVs and colours are written; left out: %s%s",
@@ -200,7 +208,6 @@ def mesh_output(
     margin: int,
     *,
     chosen: BoolArray | None = None,
-    per_vertex: bool = False,
 ) -> MeshOutput:
     """What is to be written of a mesh; its texture is no coarser than the pictures that it shows.
 
@@ -219,12 +226,4 @@ def mesh_output(
         texture is not None,
         painting,
         chosen,
-        per_vertex,
     )
-
-
-def _one_each(placed: Charted) -> FloatArray:
-    """(V, 2) one of the uvs of each vertex; of a vertex without faces the middle."""
-    uv = np.full((len(placed.mesh.vertices), 2), 0.5)
-    uv[placed.mesh.faces[::-1]] = placed.map.uv[placed.map.corners[::-1]]
-    return uv

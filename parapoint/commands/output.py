@@ -61,11 +61,11 @@ def preview_target(preview: str, out: str, surface: str, *, force: bool) -> Path
     Raises:
         InputError: it is no .png or the texture of `out`, or it cannot or may not be written.
     """
-    if Path(out).suffix in SIDES and Path(preview).absolute() == beside(
-        Path(out).absolute(), ".png"
-    ):
+    path = checked_picture(preview, inputs=[surface], force=force)
+    is_textured = Path(out).suffix.lower() in SIDES
+    if is_textured and path.resolve() == beside(Path(out).resolve(), ".png"):
         raise InputError(f"{preview}: is the texture of {out}; take another name")
-    return checked_picture(preview, inputs=[surface], force=force)
+    return path
 
 
 def write(

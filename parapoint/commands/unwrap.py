@@ -127,10 +127,19 @@ class Asked:
     per_vertex: bool
 
     def __post_init__(self) -> None:
-        check_choice("components", self.components, COMPONENTS)
-        check_whole("seed", self.seed, 0, LARGEST_SEED)
+        from parapoint.computed.parts import DISTORTIONS  # here, so that the help comes at once
+        from parapoint.planar.descent import LEAST_ENERGY
+
+        check_choice("--components", self.components, COMPONENTS)
+        check_whole("--seed", self.seed, 0, LARGEST_SEED)
         if self.time_budget is not None:
-            check_number("time_budget", self.time_budget, most=LONGEST_SECONDS, above=True)
+            check_number("--time-budget", self.time_budget, most=LONGEST_SECONDS, above=True)
+        if self.seam_price is not None:
+            check_number("--seam-price", self.seam_price)
+        if self.max_distortion is not None:
+            check_number("--max-distortion", self.max_distortion, LEAST_ENERGY, above=True)
+        if self.distortion is not None:
+            check_choice("--distortion", self.distortion, DISTORTIONS)
         unused: dict[str, object] = {
             "--seam-price": self.seam_price,
             "--max-distortion": self.max_distortion,
@@ -143,6 +152,11 @@ class Asked:
         if self.seam_price is not None and self.max_distortion is not None:
             raise InputError(
                 "--seam-price does not go with --max-distortion, which alone says how far to cut"
+            )
+        if self.max_distortion is not None and self.distortion in {"balanced", "conformal"}:
+            raise InputError(
+                f"--max-distortion bounds an energy that --distortion {self.distortion} gives up "
+                f"for angles: leave one of them out"
             )
         if self.seam_price is not None and self.distortion == "conformal":
             raise InputError("--seam-price does not go with --distortion conformal")
@@ -161,8 +175,10 @@ def _unwrap_mesh(given: Polygons, asked: Asked, tell: Tell) -> Facts:
         distortion=asked.distortion or Unwrap.distortion,
     )
     mesh, chosen = given.mesh, None
-    if asked.components == "largest" and mesh.component_count > 1:
-        mesh, chosen = largest_component(mesh)
+    if asked.components == "largest":
+        largest, is_part = largest_component(mesh)
+        if not is_part.all():
+            mesh, chosen = largest, is_part
     output = mesh_output(
         given,
         asked.surface,
@@ -170,11 +186,17 @@ def _unwrap_mesh(given: Polygons, asked: Asked, tell: Tell) -> Facts:
         asked.texture,
         MARGIN if asked.margin is None else asked.margin,
         chosen=chosen,
-        per_vertex=asked.per_vertex,
     )
     output.check(force=asked.force)
     border = BORDER if asked.margin is None else asked.margin / (asked.texture or TEXTURE)
-    request = Request(method, border, asked.seed, asked.seams, asked.preview)
+    request = Request(
+        method,
+        border,
+        asked.seed,
+        asked.seams,
+        asked.preview,
+        per_vertex=asked.per_vertex,
+    )
     return unwrap_mesh(mesh, request, output, tell)
 
 

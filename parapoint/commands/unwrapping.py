@@ -11,6 +11,7 @@ from pathlib import Path
 import click
 import numpy as np
 
+from parapoint import clock
 from parapoint.commands.mesh_output import MeshOutput
 from parapoint.commands.progress import Tell, untold
 from parapoint.commands.telling import ADVICE_OF_MESHES, warn
@@ -19,10 +20,11 @@ from parapoint.fitting import Progress
 from parapoint.method import UnsupportedError
 from parapoint.planar.domains import FlatteningError
 from parapoint.surfaces.parameterization import Charted, Parameterization
+from parapoint.surfaces.preparation import first_equal, welded
 from parapoint.surfaces.surface import IntArray, Mesh
 from parapoint.textures.packing import packed
 from parapoint.textures.preview import write_preview
-from parapoint.unwrapping.given import unwrapped_along
+from parapoint.unwrapping.given import mended_along
 from parapoint.unwrapping.quality import quality
 from parapoint.unwrapping.unwrap import Unwrap
 
@@ -45,6 +47,7 @@ class Request:
         seed: of every random draw.
         seams: file of the edges to cut along, or None for seams of the method's own.
         preview: a PNG file for a picture of the surface beside its layout, or None.
+        per_vertex: whether each vertex gets one uv, whatever the seams.
     """
 
     method: Unwrap
@@ -52,6 +55,7 @@ class Request:
     seed: int = 0
     seams: str | None = None
     preview: Path | None = None
+    per_vertex: bool = False
 
 
 def unwrap_mesh(
@@ -78,6 +82,8 @@ def unwrap_mesh(
     tell(Progress("packing"))
     placed = packed(Charted(mesh, made), request.border)
     picture = output.picture(placed, tell)
+    if request.per_vertex:
+        placed = _one_each(placed)
     tell(Progress("writing"))
     written = output.write(placed, picture)
     if request.preview is not None:
@@ -90,12 +96,36 @@ def unwrap_mesh(
         facts["overlap"] = "unknown"  # a face that was left out may lie on another
     parts = [part for part in _parts(made) if "end_energy" in part]
     facts["energy"] = round(max(float(str(part["end_energy"])) for part in parts), 4)
-    facts["components"] = mesh.component_count
+    facts["components"] = welded(mesh).component_count
     facts |= written
     facts["seconds"] = round(time.perf_counter() - began, 1)
     _warn_of_bound(facts, request)
-    warn(facts, ADVICE_OF_MESHES)
+    if request.per_vertex:
+        del facts["energy"]  # of the map along its seams, which is not written
+    warn(facts, _advice(request))
     return facts
+
+
+def _one_each(placed: Charted) -> Charted:
+    """The mesh with one of the uvs of each vertex; of a vertex without faces the middle."""
+    mesh, held = placed
+    uv = np.full((len(mesh.vertices), 2), 0.5)
+    uv[mesh.faces[::-1]] = held.uv[held.corners[::-1]]
+    return Charted(mesh, Parameterization(uv, mesh.faces))
+
+
+def _advice(request: Request) -> dict[str, str]:
+    """What helps where faces overlap, and where parts are starved, as the map was asked for."""
+    advice = dict(ADVICE_OF_MESHES)
+    if request.per_vertex:
+        advice |= {"overlap": "with --per-vertex, faces across a seam span the map"}
+    if request.seams is not None:
+        advice |= {"starved": "a longer seam helps"}
+    elif request.method.max_distortion is not None:
+        advice |= {"starved": "a longer seam helps, as with a lower --max-distortion"}
+    elif request.method.distortion == "conformal":
+        advice |= {"starved": "--distortion balanced helps, or isometric"}
+    return advice
 
 
 def expected(method: Unwrap, faces: int) -> float | None:
@@ -115,13 +145,13 @@ def _made(mesh: Mesh, request: Request, output: MeshOutput) -> Parameterization:
     Raises:
         InputError, click.ClickException: see `unwrap_mesh`.
     """
+    seams = None if request.seams is None else read_seams(request.seams, mesh)
     try:
-        if request.seams is None:
+        if seams is None:
             return request.method.unwrapped(mesh, seed=request.seed)
-        edges = read_seams(request.seams, mesh)
         seconds = request.method.time_budget
-        deadline = math.inf if seconds is None else time.monotonic() + seconds
-        return unwrapped_along(mesh, edges, deadline)
+        deadline = math.inf if seconds is None else clock.worked() + seconds
+        return mended_along(mesh, seams, deadline)
     except (UnsupportedError, InputError) as error:
         raise InputError(f"{output.source}: {error}") from None
     except FlatteningError as error:
@@ -131,10 +161,13 @@ def _made(mesh: Mesh, request: Request, output: MeshOutput) -> Parameterization:
 def read_seams(path: str, mesh: Mesh) -> IntArray:
     """(S, 2) the edges in a text file: two vertex numbers a line, counted from 1 as OBJ does.
 
+    Of several vertices at one place, either end may name any.
+
     Raises:
         InputError: the file cannot be read, or a line is no edge of the mesh.
     """
-    known = {tuple(edge) for edge in mesh.edges.tolist()}
+    first = first_equal(mesh.vertices)
+    known = {frozenset(edge) for edge in welded(mesh).edges.tolist()}
     found = []
     for number, line in enumerate(Path(path).read_text(errors="replace").splitlines(), start=1):
         words = line.split("#", 1)[0].split()
@@ -144,9 +177,10 @@ def read_seams(path: str, mesh: Mesh) -> IntArray:
             one, other = (int(word) - 1 for word in words)
         except ValueError:
             raise InputError(f"{path}: line {number} is not two vertex numbers") from None
-        if (min(one, other), max(one, other)) not in known:
+        ends = [one, other]
+        if min(ends) < 0 or max(ends) >= len(first) or frozenset(first[ends].tolist()) not in known:
             raise InputError(f"{path}: line {number} is no edge of the mesh")
-        found.append((one, other))
+        found.append(ends)
     if not found:
         raise InputError(f"{path}: has no edge")
     return np.array(found, dtype=np.int64)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple, Self
 
@@ -54,11 +55,16 @@ def write_obj(
         file.write("".join(lines).encode())
 
 
-def write_material(path: Path, texture: npt.NDArray[np.uint8]) -> str:
-    """Write a texture (.png) and its material (.mtl) beside an OBJ file; the lines that use it."""
+def write_material(path: Path, texture: npt.NDArray[np.uint8], names: Iterable[str] = ()) -> str:
+    """Write a texture (.png) and its material (.mtl) beside an OBJ file; the lines that use it.
+
+    The material is there under each of the other `names`, too.
+    """
     image, library = write_picture(path, texture), beside(path, ".mtl")
+    shown = f"Kd 1 1 1\nmap_Kd {image.name}\n"
+    materials = "".join(f"newmtl {name}\n{shown}" for name in dict.fromkeys(["map", *names]))
     with complete_file(library) as file:
-        file.write(sealed_text(f"newmtl map\nKd 1 1 1\nmap_Kd {image.name}\n"))
+        file.write(sealed_text(materials))
     return f"mtllib {library.name}\nusemtl map\n"
 
 

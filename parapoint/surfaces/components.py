@@ -9,6 +9,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
+from parapoint.surfaces.preparation import welded
 from parapoint.surfaces.scan_lines import breadth
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh, Surface
 
@@ -35,11 +36,11 @@ def parts_of(surface: Surface, which: str) -> list[Surface]:
         which: one of COMPONENTS.
     """
     if which == "together":
-        if isinstance(surface, Mesh) and surface.component_count > 1:
+        if isinstance(surface, Mesh) and (count := welded(surface).component_count) > 1:
             logger.warning(
                 "%d components: one map is fitted to all of them; --components each or largest "
                 "fits them apart",
-                surface.component_count,
+                count,
             )
         return [surface]
     parts = components(surface)
@@ -52,11 +53,11 @@ def parts_of(surface: Surface, which: str) -> list[Surface]:
 def components(surface: Surface) -> list[Surface]:
     """The components of a surface, largest first (a mesh's by area, a cloud's by points).
 
-    Of a mesh: faces that share vertices, left out where they have no area. Of a cloud: connected
+    Of a mesh: faces that share places, left out where they have no area. Of a cloud: connected
     components of the graph that joins each point to its NEIGHBOURS nearest and the next scan line.
     """
     if isinstance(surface, Mesh):
-        label = surface.face_components
+        label = welded(surface).face_components
         area = np.bincount(label, weights=surface.face_areas)
         order = [k for k in np.argsort(-area, kind="stable") if area[k] > 0]
         return [_submesh(surface, label == k) for k in order] or [surface]
@@ -67,7 +68,7 @@ def components(surface: Surface) -> list[Surface]:
 
 def largest_component(mesh: Mesh) -> tuple[Mesh, BoolArray]:
     """The component of the largest area, and (F,) which faces are its."""
-    label = mesh.face_components
+    label = welded(mesh).face_components
     chosen = label == np.bincount(label, weights=mesh.face_areas).argmax()
     return _submesh(mesh, chosen), chosen
 

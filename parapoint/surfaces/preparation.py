@@ -8,7 +8,8 @@ What a method `requires` decides: a method gets the surface as it is wherever th
   no slit is left; other faces without area are dropped, and so are copies of a face.
 - *split* (`manifold`): the surface is opened along edges of more than two faces, and at vertices
   where more than one fan of faces meets.
-- *turn* (`oriented`): neighbouring faces turn alike; a one-sided surface is first cut open.
+- *turn* (`oriented`, which also asks for `manifold` and for faces with area): neighbouring faces
+  turn alike; a one-sided surface is first cut open.
 - *components* (`connected`): each is mapped on its own; all are scaled alike and laid side by side.
 - *cut* (`disk_after_cut`, which also asks for all the others): what is no disk, with or without
   holes, is cut to one.
@@ -161,8 +162,8 @@ def _meets(mesh: Mesh, words: frozenset[str]) -> bool:
     return (
         ("manifold" not in words or mesh.is_manifold)
         and ("oriented" not in words or mesh.is_oriented)
+        and ("oriented" not in words or not flat_faces(mesh.vertices, mesh.faces).any())
         and ("connected" not in words or mesh.component_count == 1)
-        and ("disk_after_cut" not in words or not flat_faces(mesh.vertices, mesh.faces).any())
     )
 
 
@@ -178,7 +179,7 @@ def _repaired(mesh: Mesh, words: frozenset[str]) -> tuple[list[Mesh], list[str],
         if count:
             steps.append(f"{step} {count} {thing if count == 1 else plural or thing + 's'}")
 
-    whole = _welded(mesh)
+    whole = welded(mesh)
     note(int(mesh.referenced.sum() - whole.referenced.sum()), "welded", "vertex", "vertices")
     solid = (whole.faces != np.roll(whole.faces, 1, axis=1)).all(axis=1)
     if flat_faces(whole.vertices, whole.faces).all():
@@ -215,12 +216,20 @@ def _repaired(mesh: Mesh, words: frozenset[str]) -> tuple[list[Mesh], list[str],
     return parts, steps, _origin(whole.faces, place[order])
 
 
-def _welded(mesh: Mesh) -> Mesh:
+def welded(mesh: Mesh) -> Mesh:
     """The mesh with every face at the first of the vertices at each place."""
-    _, first, place = np.unique(
-        mesh.vertices + 0.0, axis=0, return_index=True, return_inverse=True
-    )  # -0.0 + 0.0 is 0.0
-    return Mesh(mesh.vertices, first[place.reshape(-1)][mesh.faces])
+    return Mesh(mesh.vertices, first_equal(mesh.vertices)[mesh.faces])
+
+
+def first_equal(rows: FloatArray) -> IntArray:
+    """(N,) for each row of (N, k), the first of those that equal it."""
+    order = np.lexsort(rows.T)  # rows that are equal keep their order
+    ordered = rows[order]
+    is_new = np.ones(len(rows), dtype=bool)
+    is_new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    first = np.empty(len(rows), dtype=np.int64)
+    first[order] = order[is_new][np.cumsum(is_new) - 1]
+    return first
 
 
 def _first_of_each(rows: IntArray) -> BoolArray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from parapoint.files.attributes import unit_colours
+from parapoint.files.attributes import srgb, unit_colours
 from parapoint.files.painting import WHITE, Painting, Picture
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.surface import FloatArray
@@ -19,6 +19,7 @@ def repainted(
     size: int,
     margin: int = MARGIN,
     *,
+    tints: bool = False,
     done: Done = unwatched,
 ) -> Picture:
     """(size, size, 3 or 4) the texture of a mesh with what its file paints on it.
@@ -31,6 +32,7 @@ def repainted(
         painting: what is painted on its triangles, in their order.
         size: texels along a side.
         margin: texels around each chart that repeat its edge.
+        tints: whether the colour of a material tints its picture, as it does in glTF.
         done: is called on the way.
     """
     shown = texels(charted, size)
@@ -51,6 +53,9 @@ def repainted(
             out[here, :3] = material.colour
             if material.picture is not None:
                 out[here] = _seen(material.picture, uv[here], width)
+                if tints and material.colour != WHITE:
+                    light = _linear(out[here, :3] / 255) * _linear(np.array(material.colour) / 255)
+                    out[here, :3] = 255 * srgb(light)
         return out
 
     flat = painted(shown, width, np.uint8, values, done)
@@ -75,6 +80,11 @@ def coloured(
 
     flat = painted(shown, 3, np.uint8, values, done)
     return dilated(flat, shown, margin).astype(np.uint8, copy=False)
+
+
+def _linear(parts: FloatArray) -> FloatArray:
+    """Parts of sRGB colours, from 0 to 1, as parts of linear ones."""
+    return np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
 
 
 def _seen(picture: Picture, uv: FloatArray, width: int) -> FloatArray:

@@ -4,13 +4,63 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from parapoint.errors import InputError
 from parapoint.planar.descent import Run
 from parapoint.planar.domains import check_triangles
-from parapoint.surfaces.cutting import cut_along, cut_to_disk
+from parapoint.surfaces.cutting import cut_along, cut_to_disk, edge_lengths, edge_mask
 from parapoint.surfaces.parameterization import Parameterization
-from parapoint.surfaces.surface import IntArray, Mesh
+from parapoint.surfaces.preparation import Preparation, first_equal, prepared
+from parapoint.surfaces.surface import BoolArray, IntArray, Mesh, flat_faces
 from parapoint.unwrapping.packing import by_component
+
+
+def mended_along(mesh: Mesh, seams: IntArray, deadline: float = math.inf) -> Parameterization:
+    """The map of any mesh along its seams: welded and mended first, as `Unwrap` does it.
+
+    Args:
+        mesh: what is unwrapped.
+        seams: (S, 2) vertices; the mesh is cut wherever an edge joins their places.
+        deadline: see `unwrapped_along`.
+
+    Raises:
+        UnsupportedError: no face has an area.
+        FlatteningError: a chart has no start without flips.
+    """
+    first = first_equal(mesh.vertices)
+    whole = Mesh(mesh.vertices, first[mesh.faces])
+    preparation = prepared(whole, frozenset({"manifold", "oriented"}))
+    (part,) = preparation.parts
+    assert isinstance(part, Mesh)
+    cut = _beside_flat_faces(whole, edge_mask(whole, first[seams]))
+    made = unwrapped_along(part, _carried(whole, cut, preparation, part), deadline)
+    joined = preparation.joined([made])
+    assert isinstance(joined, Parameterization)
+    report = {**made.report, "steps": preparation.steps}
+    return Parameterization(joined.uv, joined.corners, report=report)
+
+
+def _beside_flat_faces(mesh: Mesh, cut: BoolArray) -> BoolArray:
+    """(E,) the edges that are cut, and the short ones of faces without area whose long one is."""
+    sides = mesh.edge_of_halfedge.reshape(-1, 3)[flat_faces(mesh.vertices, mesh.faces)]
+    longest = sides[np.arange(len(sides)), edge_lengths(mesh)[sides].argmax(axis=1)]
+    while True:
+        wider = cut.copy()
+        wider[sides[cut[longest]]] = True
+        if (wider == cut).all():
+            return cut
+        cut = wider
+
+
+def _carried(whole: Mesh, cut: BoolArray, preparation: Preparation, part: Mesh) -> IntArray:
+    """(S, 2) the edges of the part that a whole mesh became, at those that are cut in this."""
+    if preparation.origin is None:
+        return whole.edges[cut]
+    corner = np.flatnonzero(cut[whole.edge_of_halfedge])
+    following = corner - corner % 3 + (corner + 1) % 3
+    vertex = part.faces.reshape(-1)[preparation.origin.reshape(-1)]
+    return part.edges[edge_mask(part, np.stack([vertex[corner], vertex[following]], axis=1))]
 
 
 def unwrapped_along(mesh: Mesh, seams: IntArray, deadline: float = math.inf) -> Parameterization:

@@ -12,10 +12,14 @@ from scipy.sparse import csgraph
 from parapoint.planar.crossing import crossing_vertices
 from parapoint.surfaces.areas import LEAST_PART, STARVED
 from parapoint.surfaces.parameterization import Charted, Parameterization
+from parapoint.surfaces.preparation import first_equal, welded
 from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, flat_faces, twin_halfedges
+from parapoint.textures.texels import texels
 
 DOUBLED = 1e-6
 """Share of a map's area that may be covered twice by rounding alone."""
+FINE = 512
+"""Texels along a side of the grid on which we count what a map fills whose faces overlap."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +39,7 @@ class Quality:
             over or an edge has more than two.
         charts: pieces of the map.
         seam: length of the cut over sqrt(area).
-        filled: share of the unit square that the map fills.
+        filled: share of the unit square that the map fills; what lies twice counts once.
         texels_per_unit: of a texture, along a length of 1 of the mesh, at the mean scale.
     """
 
@@ -61,12 +65,13 @@ class Quality:
 
 
 def quality(placed: Charted, texture: int) -> Quality:
-    """The quality of a map in the unit square.
+    """The quality of a map in the unit square, with vertices at one place as one.
 
     Args:
         placed: the mesh and its map; faces without area take no part but in the charts.
         texture: texels along a side of the square.
     """
+    placed = _welded(placed)
     mesh, held = placed
     solid = ~flat_faces(mesh.vertices, mesh.faces)
     space = mesh.vertices[mesh.faces[solid]]
@@ -84,6 +89,10 @@ def quality(placed: Charted, texture: int) -> Quality:
     whole = np.zeros((2, len(mesh.faces)))
     whole[:, solid] = share, ratio * share
     flipped = int((signed <= 0).sum())
+    overlap = "unknown" if flipped else _overlap(held)
+    filled = float(np.abs(signed).sum())
+    if overlap != "none":
+        filled = texels(placed, FINE).inside.sum() / FINE**2
     return Quality(
         angle_mean=float(share @ angles.mean(axis=1)),
         angle_worst=float(angles.max()),
@@ -92,12 +101,22 @@ def quality(placed: Charted, texture: int) -> Quality:
         smallest_part=_smallest_part(placed, starved, *whole),
         starved=float(share[ratio < STARVED].sum()),
         flipped=flipped,
-        overlap="unknown" if flipped else _overlap(held),
+        overlap=overlap,
         charts=int(held.charts().max()) + 1,
         seam=cut / float(np.sqrt(area.sum())),
-        filled=float(np.abs(signed).sum()),
+        filled=filled,
         texels_per_unit=texture * float(np.sqrt(np.abs(signed).sum() / area.sum())),
     )
+
+
+def _welded(placed: Charted) -> Charted:
+    """The mesh welded, and its map with one row for all corners at one vertex and one uv."""
+    whole, held = welded(placed.mesh), placed.map
+    if np.array_equal(whole.faces, placed.mesh.faces):
+        return placed
+    uv = held.uv[held.corners.reshape(-1)]
+    row = first_equal(np.column_stack([whole.faces.reshape(-1), uv]))
+    return Charted(whole, Parameterization(uv, row.reshape(-1, 3)))
 
 
 def _overlap(held: Parameterization) -> str:

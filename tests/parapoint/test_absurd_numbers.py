@@ -71,6 +71,7 @@ def test_absurd_numbers_are_one_line(
         shown = capsys.readouterr()
         assert (end.value.code, shown.out, shown.err.count("\n")) == (2, "", 1), (value, shown.err)
         assert len(shown.err) < 2100, value
+        assert option in shown.err, value
         assert not list(tmp_path.iterdir()), value
 
 

@@ -138,10 +138,10 @@ def test_unwrap_a_mesh_with_a_checkerboard(disk, tmp_path, capsys) -> None:
             ["fit", "CLOUD", "--out", "m", "--preset", "best"],
             "--preset must be one of computed, learned, paper, not 'best'",
         ),
-        (["fit", "CLOUD", "--out", "m", "--points", "12"], "points must be"),
+        (["fit", "CLOUD", "--out", "m", "--points", "12"], "--points must be"),
         (
             ["fit", "CLOUD", "--out", "m", "--distortion-weight", "-1", "--preset", "paper"],
-            "distortion_weight must be",
+            "--distortion-weight must be",
         ),
         (["fit", "CLOUD", "--out", "CLOUD"], "is a file; name a folder"),
         (

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from parapoint import Mesh, ParaPoint, PointCloud
-from parapoint.surfaces.components import cloud_labels, components, parts_of
+from parapoint.surfaces.components import cloud_labels, components, largest_component, parts_of
 from parapoint.testing import irregular_disk
 
 TINY = {"preset": "paper", "points": 400, "subset": 100, "iterations": 4, "device": "cpu"}
@@ -44,6 +44,17 @@ def test_a_mesh_s_components_come_by_area() -> None:
     large, small = components(both)
     np.testing.assert_allclose(large.vertices, 2 * disk.vertices)
     np.testing.assert_array_equal(small.faces, disk.faces)
+
+
+def test_vertices_at_one_place_join_the_components_of_a_mesh() -> None:
+    disk = irregular_disk()
+    corners = disk.vertices[disk.faces].reshape(-1, 3)
+    points = np.concatenate([corners, 2 * corners[:3] + 9])
+    soup = Mesh(points, np.arange(len(points)).reshape(-1, 3))
+    assert [len(part.faces) for part in components(soup)] == [len(disk.faces), 1]
+    part, chosen = largest_component(soup)
+    np.testing.assert_array_equal(np.flatnonzero(~chosen), len(disk.faces))
+    np.testing.assert_array_equal(part.vertices, corners)
 
 
 @pytest.fixture(scope="module")

@@ -142,6 +142,19 @@ def test_a_face_with_its_vertex_on_its_long_edge_leaves_no_slit():
     assert_array_equal(result.uv[result.corners], points[mesh.faces][:, :, :2])
 
 
+@pytest.mark.parametrize("words", [{"oriented"}, {"manifold", "oriented", "connected"}])
+def test_what_is_to_turn_alike_has_faces_with_area(words):
+    """A triangle lies on the rim of another, with a vertex in the middle of its long edge."""
+    points = [[0.0, 0, 0], [2, 0, 0], [1, 1, 0], [1, 0, 0]]
+    mesh = Mesh(points, [[0, 1, 2], [1, 0, 3]])
+    assert mesh.topology == "disk"
+    preparation = prepared(mesh, frozenset(words))
+    assert preparation.steps == "flipped the long edge of 1 face without area"
+    (part,) = preparation.parts
+    assert_allclose(part.face_areas, [0.5, 0.5])
+    assert prepared(mesh, frozenset({"manifold"})).parts == (mesh,)
+
+
 def test_pages_of_a_book_are_split_and_packed_in_one_scale():
     book = pages(4)
     preparation, result = mapped(book)

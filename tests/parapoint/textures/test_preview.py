@@ -73,6 +73,27 @@ def test_the_nearest_point_is_seen_in_its_light() -> None:
     assert behind[int(64 * (0.5 - 0.46 * 0.5)), int(64 * (0.5 - 0.46 * 0.5))].tolist() == GREEN
 
 
+@pytest.mark.parametrize("is_backed", [True, False])
+def test_a_pixel_that_no_point_of_a_sheet_fell_on_is_filled(is_backed) -> None:
+    """The sheet is red, with a point for each of 60 by 60 pixels; behind is green, or nothing."""
+    y, z = (of.reshape(-1) for of in np.meshgrid(*2 * [np.linspace(-1, 1, 60)]))
+    sheet = np.stack([np.ones(3600), y, z], axis=1)
+    is_missed = np.zeros((60, 60), dtype=bool)
+    is_missed[5::10, 3:57:7] = True
+    front, back = sheet[~is_missed.reshape(-1)], sheet[: 3600 * is_backed] * [-1, 1, 1]
+
+    def seen(*parts: np.ndarray) -> np.ndarray:
+        colours = [
+            np.tile(of, (len(part), 1)) for of, part in zip((RED, GREEN), parts, strict=False)
+        ]
+        points = np.concatenate(parts)
+        normals = np.tile([1.0, 0, 0], (len(points), 1))
+        return room._seen(points, normals, np.concatenate(colours), np.array([1.0, 0, 0]))
+
+    assert_array_equal(seen(front, back), seen(sheet))
+    assert (seen(front, back) == RED).all(axis=2).sum() == 3600
+
+
 def test_the_picture_shows_both_sides_and_the_layout() -> None:
     picture = room.preview(SQUARE, TEXTURE)
     assert picture.shape == (64, 192, 3)

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from PIL import Image
 
 from parapoint import InputError, Mesh, Parameterization
-from parapoint.commands.mesh_output import _one_each, mesh_output
+from parapoint.commands.mesh_output import mesh_output
 from parapoint.files.gltf import opened
 from parapoint.files.mesh_writers import write_glb, write_ply
 from parapoint.files.painting import painting_of
@@ -135,6 +135,31 @@ def test_a_picture_that_cannot_be_read_is_one_line(textured, tmp_path) -> None:
     (tmp_path / "old one.png").write_bytes(b"\x89PNG nothing")
     with pytest.raises(InputError, match=r"sheet\.obj: .*old one\.png: is no picture"):
         written(textured, tmp_path / "new.obj")
+
+
+@pytest.mark.parametrize(
+    "uses", [["foo"], ["foo", "bar # of old", "map"], ["two words", "foo", "foo"], ["K\u00f6rper"]]
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
+def test_materials_that_no_library_holds_show_the_new_texture(uses, encoding, tmp_path) -> None:
+    points, quads = grid()
+    lines = [f"v {x} {y} {z}" for x, y, z in points]
+    for k, quad in enumerate(quads):
+        lines += [f"usemtl {uses[k - 1]}"] if 0 < k <= len(uses) else []
+        lines.append("f " + " ".join(str(at + 1) for at in quad))
+    source, out = tmp_path / "a.obj", tmp_path / "new.obj"
+    source.write_text("\n".join(lines) + "\n", encoding=encoding)
+    written(source, out)
+    new = [line for line in out.read_bytes().splitlines() if line.startswith((b"usemtl", b"mtl"))]
+    assert new == [
+        b"mtllib new.mtl",
+        b"usemtl map",
+        *(f"usemtl {of}".encode(encoding) for of in uses),
+    ]
+    painting = painting_of(out, np.arange(len(quads)), np.zeros((len(quads), 3, 2)))
+    used = [painting.materials[k] for k in np.unique(painting.material_of)]
+    assert len(used) == len({"map", *uses})
+    assert all(one.picture.shape == (256, 256, 3) for one in used)
 
 
 def ply_sheet(path, text) -> None:
@@ -439,12 +464,3 @@ def test_one_colour_alone_is_no_painting(tmp_path) -> None:
     given = read_polygons(tmp_path / "a.glb")
     painting = painting_of(tmp_path / "a.glb", given.polygon_of, given.uv)
     assert painting.largest == 64
-
-
-def test_of_the_uvs_of_a_vertex_one_is_chosen_and_without_any_the_middle() -> None:
-    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [9, 9, 9]])
-    uv = np.array([[0.1, 0.1], [0.4, 0.1], [0.4, 0.4], [0.6, 0.6], [0.9, 0.9], [0.6, 0.9]])
-    placed = Charted(
-        Mesh(points, [[0, 1, 2], [0, 2, 3]]), Parameterization(uv, [[0, 1, 2], [3, 4, 5]])
-    )
-    assert_allclose(_one_each(placed), [*uv[:3], uv[5], [0.5, 0.5]])

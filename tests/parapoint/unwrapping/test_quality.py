@@ -5,6 +5,9 @@ import pytest
 
 from parapoint import Mesh, Parameterization
 from parapoint.surfaces.parameterization import Charted
+from parapoint.testing import sphere
+from parapoint.textures.packing import packed
+from parapoint.unwrapping.given import mended_along
 from parapoint.unwrapping.quality import quality
 
 
@@ -135,3 +138,35 @@ def test_the_least_part_is_the_one_that_hangs_together() -> None:
         found = quality(Charted(Mesh(points, faces), Parameterization(uv, faces)), 64)
         assert found.smallest_part == pytest.approx(0.1 / kept.sum())
         assert found.starved == pytest.approx(0.1)
+
+
+def test_a_map_has_the_same_quality_however_its_vertices_are_split() -> None:
+    """A sphere that is cut open: each face, or each side of the cut, has vertices of its own."""
+    mesh = sphere()
+    charted = packed(Charted(mesh, mended_along(mesh, mesh.edges[:0])))
+    whole = quality(charted, 64)
+    assert (whole.charts, whole.overlap) == (1, "none")
+    assert whole.seam > 0.5
+    held = charted.map
+    own = np.arange(mesh.faces.size).reshape(-1, 3)
+    soup = Mesh(mesh.vertices[mesh.faces].reshape(-1, 3), own)
+    points = np.empty((len(held.uv), 3))
+    points[held.corners] = mesh.vertices[mesh.faces]
+    for split, rows in (
+        (soup, held),
+        (soup, Parameterization(held.uv[held.corners].reshape(-1, 2), own)),
+        (Mesh(points, held.corners), held),
+    ):
+        assert quality(Charted(split, rows), 64).facts() == whole.facts()
+
+
+@pytest.mark.parametrize("turn", [1, -1])
+def test_what_faces_fill_together_counts_once(turn) -> None:
+    """Half of the square twice, the second time perhaps turned over; and a quarter beside it."""
+    half, quarter = [[0, 1, 2], [0, 2, 3]], [[1, 4, 5], [1, 5, 6]]
+    uv = [[0.0, 0], [0.5, 0], [0.5, 1], [0, 1], [1, 0], [1, 0.5], [0.5, 0.5]]
+    faces = np.array([*half, *(np.array(half)[:, ::turn]), *quarter])
+    mesh = Mesh(np.pad(uv, ((0, 0), (0, 1))), faces)
+    found = quality(Charted(mesh, Parameterization(uv, faces)), 64)
+    assert found.overlap == "unknown"
+    assert found.filled == pytest.approx(0.75, rel=1e-3)

@@ -2,19 +2,24 @@
 
 import contextlib
 import json
+import math
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from PIL import Image
 
-from parapoint import cli
+from parapoint import cli, clock
 from parapoint.commands.telling import ADVICE_OF_MESHES, warn
-from parapoint.commands.unwrapping import Request, _warn_of_bound, expected
+from parapoint.commands.unwrapping import Request, _advice, _one_each, _warn_of_bound, expected
 from parapoint.files.reading import read_parameterized, read_surface
 from parapoint.surfaces.areas import LEAST_PART, MOST_STARVED
+from parapoint.surfaces.parameterization import Charted, Parameterization
 from parapoint.surfaces.surface import Mesh
-from parapoint.testing import irregular_disk
+from parapoint.testing import irregular_disk, sphere
 from parapoint.unwrapping import unwrap
+from parapoint.unwrapping.given import mended_along
+from parapoint.unwrapping.quality import quality
 from parapoint.unwrapping.unwrap import Unwrap
 
 BOX = """# a box of quads
@@ -110,16 +115,111 @@ def test_a_seam_through_a_polygon_makes_it_triangles_and_says_so(
     assert (tmp_path / "out.obj").read_text().count("\nf ") == 7
 
 
-def test_other_formats_and_one_uv_a_vertex(box, tmp_path, capsys, caplog) -> None:
+def soup(path) -> None:
+    """Write a sphere whose faces have three vertices each of their own."""
+    ball = sphere()
+    lines = [f"v {x} {y} {z}" for x, y, z in ball.vertices[ball.faces].reshape(-1, 3)]
+    lines += [f"f {k} {k + 1} {k + 2}" for k in range(1, ball.faces.size, 3)]
+    path.write_text("\n".join(lines))
+
+
+def test_seams_join_the_vertices_that_lie_at_one_place(tmp_path, capsys) -> None:
+    """Each end of an edge is named by another of the vertices there than a face of it has."""
+    soup(tmp_path / "soup.obj")
+    ball = sphere()
+    last = {vertex: k + 1 for k, vertex in enumerate(ball.faces.reshape(-1).tolist())}
+    a, b = ball.edges[0].tolist()
+    c = next(of for of in ball.edges.tolist() if b == of[0] and a not in of)[1]
+    (tmp_path / "seams.txt").write_text(f"{last[a]} {last[b]}\n{last[b]} {last[c]}\n")
+    arguments = ["unwrap", tmp_path / "soup.obj", "--out", tmp_path / "out.obj", "--json"]
+    status, out, _ = run([*arguments, "--seams", tmp_path / "seams.txt"], capsys)
+    assert status == 0
+    facts = json.loads(out)
+    assert (facts["charts"], facts["components"], facts["overlap"]) == (1, 1, "none")
+    ends = ball.vertices[[a, b, c]]
+    length = np.linalg.norm(np.diff(ends, axis=0), axis=1).sum()
+    assert facts["seam"] == pytest.approx(length / np.sqrt(ball.face_areas.sum()), rel=1e-3)
+    vertices = [
+        line for line in (tmp_path / "out.obj").read_text().splitlines() if line[:2] == "v "
+    ]
+    assert vertices == (tmp_path / "soup.obj").read_text().splitlines()[: len(vertices)]
+
+
+def test_the_largest_component_is_found_across_split_vertices(tmp_path, capsys) -> None:
+    """A square of two triangles, each with its own vertices, and a triangle apart."""
+    corners = [(0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1), (5, 5), (6, 5), (5, 6)]
+    lines = [f"v {x} {y} 0" for x, y in corners] + ["f 1 2 3", "f 4 5 6", "f 7 8 9"]
+    (tmp_path / "square.obj").write_text("\n".join(lines))
+    arguments = ["unwrap", tmp_path / "square.obj", "--out", tmp_path / "out.obj", "--json"]
+    _, out, _ = run([*arguments, "--components", "largest"], capsys)
+    facts = json.loads(out)
+    assert [facts[name] for name in ("faces", "charts", "components", "seam")] == [2, 1, 1, 0]
+
+
+def test_seams_share_the_clock_of_the_time_budget(box, tmp_path, capsys, monkeypatch) -> None:
+    deadlines = []
+
+    def noted(mesh, seams, deadline):
+        deadlines.append(deadline - clock.worked())
+        return mended_along(mesh, seams, deadline)
+
+    monkeypatch.setattr("parapoint.commands.unwrapping.mended_along", noted)
+    for more in ([], ["--time-budget", 50]):
+        assert unfold(box, tmp_path / "out.obj", capsys, *more)[0] == 0
+    assert deadlines == [math.inf, pytest.approx(50, abs=1)]
+
+
+@pytest.mark.parametrize("ending", ["obj", "ply", "glb", "npz"])
+def test_each_vertex_gets_one_uv_and_faces_and_figures_are_of_that(
+    ending, tmp_path, capsys, caplog
+) -> None:
+    """A tetrahedron is cut to a net of its four faces; two of them cannot keep their places."""
+    (tmp_path / "four.off").write_text(
+        "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"
+    )
+    (tmp_path / "net.txt").write_text("1 2\n1 3\n1 4\n")
+    out = tmp_path / f"new.{ending}"
+    arguments = ["unwrap", tmp_path / "four.off", "--seams", tmp_path / "net.txt", "--out", out]
+    status, said, _ = run([*arguments, "--per-vertex", "--texture", 64, "--json"], capsys)
+    facts = json.loads(said)
+    assert (status, facts["seam"], "energy" in facts) == (0, 0, False)
+    assert facts["overlap"] == "unknown"
+    assert "with --per-vertex, faces across a seam span the map" in caplog.text
+    mesh, held = read_parameterized(out)
+    assert len(mesh.vertices) == len(np.unique(held.corners)) == 4
+    assert np.array_equal(held.corners, mesh.faces)
+    found = quality(Charted(mesh, held), 64).facts()
+    for name in ("angle_mean", "angle_worst", "stretch_worst", "flipped", "filled"):
+        assert facts[name] == pytest.approx(found[name], rel=1e-3)
+    if ending == "npz":
+        assert "no texture is written: this format has none" in caplog.text
+    elif ending != "glb":
+        with Image.open(tmp_path / "new.png") as picture:
+            assert picture.size == (64, 64)
+
+
+def test_of_the_uvs_of_a_vertex_one_is_chosen_and_without_any_the_middle() -> None:
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [9, 9, 9]])
+    uv = np.array([[0.1, 0.1], [0.4, 0.1], [0.4, 0.4], [0.6, 0.6], [0.9, 0.9], [0.6, 0.9]])
+    placed = Charted(
+        Mesh(points, [[0, 1, 2], [0, 2, 3]]), Parameterization(uv, [[0, 1, 2], [3, 4, 5]])
+    )
+    assert_allclose(_one_each(placed).map.uv, [*uv[:3], uv[5], [0.5, 0.5]])
+
+
+def test_a_texture_that_an_obj_file_has_no_use_for_is_said(box, tmp_path, capsys, caplog) -> None:
+    unfold(box, tmp_path / "out.obj", capsys, "--texture", 64)
+    assert "no texture is written: its own materials stay" in caplog.text
+    assert not (tmp_path / "out.png").exists()
+
+
+def test_other_formats(box, tmp_path, capsys, caplog) -> None:
     unfold(box, tmp_path / "out.npz", capsys)
     assert "left out: old UVs, polygons. A .obj file would keep them" in caplog.text
     with np.load(tmp_path / "out.npz") as held:
         assert held["vertices"].shape == (8, 3)
         assert held["uv"].shape == (14, 2)
         assert held["corners"].shape == held["faces"].shape == (12, 3)
-    unfold(box, tmp_path / "one.npz", capsys, "--per-vertex")
-    with np.load(tmp_path / "one.npz") as held:
-        assert held["uv"].shape == (8, 2)
     unfold(box, tmp_path / "out.glb", capsys)
     assert len(read_surface(tmp_path / "out.glb").faces) == 12
 
@@ -128,11 +228,13 @@ def test_other_formats_and_one_uv_a_vertex(box, tmp_path, capsys, caplog) -> Non
     ("seams", "more", "message"),
     [
         ("1 7\n", [], "line 1 is no edge of the mesh"),
+        ("1 2\n0 1\n", [], "line 2 is no edge of the mesh"),
+        ("2 99\n", [], "line 1 is no edge of the mesh"),
         ("1 2 3\n", [], "line 1 is not two vertex numbers"),
         ("# none\n", [], "has no edge"),
         (NET, ["--max-distortion", "4.1"], "--max-distortion does not go with --seams"),
         (NET, ["--components", "largest"], "--components largest does not go with --seams"),
-        (NET, ["--components", "some"], "components must be one of"),
+        (NET, ["--components", "some"], "--components must be one of"),
     ],
 )
 def test_wrong_use_is_one_line(seams, more, message, box, capsys) -> None:
@@ -142,6 +244,7 @@ def test_wrong_use_is_one_line(seams, more, message, box, capsys) -> None:
     assert (status, out) == (2, "")
     assert message in err
     assert err.count("\n") == 1
+    assert "--seams" in err or err.count(str(box.parent)) <= 1
     assert not target.exists()
 
 
@@ -183,6 +286,21 @@ def test_a_picture_of_a_mesh_is_opaque_and_upright(name, is_y_up, box, capsys, m
     status, *_ = run([*arguments, "--preview", folder / "seen.png"], capsys)
     assert status == 0
     assert seen == [(3, is_y_up)]
+
+
+@pytest.mark.parametrize(
+    ("asked", "word"),
+    [
+        (Request(Unwrap(), 0.0), "--seam-price"),
+        (Request(Unwrap(), 0.0, seams="net.txt"), "a longer seam helps"),
+        (Request(Unwrap(max_distortion=4.1), 0.0), "--max-distortion"),
+        (Request(Unwrap(distortion="conformal"), 0.0), "--distortion balanced"),
+    ],
+)
+def test_no_advice_names_an_option_that_is_excluded(asked, word) -> None:
+    advice = _advice(asked)["starved"]
+    assert word in advice
+    assert ("--seam-price" in advice) == (word == "--seam-price")
 
 
 @pytest.mark.parametrize("more", [0.0, 1e-4])
@@ -264,7 +382,10 @@ def test_no_part_collapses_however_dear_the_seam_is(distortion, height) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--distortion", "conformal", "--max-distortion", 4.5], "max_distortion bounds an energy"),
+        (
+            ["--distortion", "conformal", "--max-distortion", 4.5],
+            "--max-distortion bounds an energy",
+        ),
         (["--distortion", "conformal", "--seam-price", 1], "--seam-price does not go"),
         (["--max-distortion", 4.5, "--seam-price", 1], "--max-distortion, which alone says"),
         (["--distortion", "wavy"], "isometric"),
