@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 
 from parapoint.errors import InputError
-from parapoint.files.columns import UNEVEN, are_atoms, columns_of, is_number
+from parapoint.files.columns import UNEVEN, Columns, are_atoms, columns_of, is_number
 from parapoint.files.content import Content, plain_numbers, points_content
 from parapoint.files.headings import Heading, heading_of
 from parapoint.surfaces.surface import FloatArray
@@ -270,8 +270,9 @@ def _cloud(lines: list[bytes]) -> Content:
         raise InputError(_fault(lines, start, rows, [0, 1, 2]))
     if are_atoms(lines[:start], len(rows), sample):
         logger.warning("the first column holds atomic numbers: the coordinates are behind it")
-        return points_content(table(rows, (1, 2, 3)))
-    columns = columns_of(headings, sample, step, is_exact)
+        columns = Columns([1, 2, 3], [], [], is_whole=False, may_vary=True)
+    else:
+        columns = columns_of(headings, sample, step, is_exact)
     read = columns.axes + columns.others
     try:
         values = table(rows, None)[:, read] if columns.is_whole else table(rows, read)

@@ -146,6 +146,7 @@ def test_comments_are_no_headings(
         ("# by hand\n\nz y x\n1 2 3\n4 5 A0\n", "has 'A0' in line 5, column 3, where x should be"),
         ("1 2 3\n4 5\n", "has only 2 columns in line 2; x, y or z is missing"),
         ("2\nmethane\nC 1 2 3\nH 4 5 6\n", "has 'C' in line 3, column 1"),
+        ("2\nmethane\n6 .1 2 3\n1 4 5 A0\n", "has 'A0' in line 4, column 4, where z should be"),
         ("<html>\n<body>\n", "has no point: none of its lines holds three numbers"),
         ("1\u00a0234,5;2;3\n", "no-break spaces between digits"),
         ("1 234,5;2;3\n4;5,5;6\n", r"has blanks inside numbers \(1 234.5\)"),
