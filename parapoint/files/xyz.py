@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 
 from parapoint.errors import InputError
-from parapoint.files.columns import UNEVEN, are_atoms, columns_of, is_number
+from parapoint.files.columns import UNEVEN, Columns, are_atoms, columns_of, is_number
 from parapoint.files.content import Content, plain_numbers, points_content
 from parapoint.files.headings import Heading, heading_of
 from parapoint.surfaces.surface import FloatArray
@@ -115,15 +115,20 @@ def _blank_parted(lines: list[bytes], names: int = 0) -> tuple[list[bytes], bool
     Raises:
         InputError: commas part numbers or mark decimals, and it cannot be told which.
     """
-    text = b"\n".join(lines)
+    text = joined = b"\n".join(lines)
     if b'"' in text:
-        text = QUOTED.sub(lambda found: re.sub(rb"[\s,;|]", b"_", found[1]), text)
+        text = QUOTED.sub(lambda found: re.sub(rb"[\s,;|#]", b"_", found[1]), text)
         text = text.translate(None, b'"')
+    if b"#" in text:
+        text = re.sub(rb"[ \t]*#.*", b"", text)
+    if text is not joined:
         lines = text.split(b"\n")
     if not any(mark in text for mark in (b",", b";", b"|", b"\t")):
         return lines, False
-    looked_at = [line for line in lines[:: len(lines) // LOOKED_AT + 1] if re.search(rb"\d", line)]
-    mark = next((mark for mark in (b";", b"|") if mark in text), b"")
+    step = len(lines) // LOOKED_AT + 1
+    looked_at = [line for line in lines[::step] if re.search(rb"\d", line)]
+    marks = (mark for mark in (b";", b"|") if all(mark in line for line in looked_at))
+    mark = next(marks, b"") if looked_at else b""
     if b"," in text:
         # A comma with a blank behind it parts numbers, whatever those inside words do.
         words = [re.sub(rb",(?=\s|$)|[;|]", b" ", line).split() for line in looked_at]
@@ -142,11 +147,11 @@ def _blank_parted(lines: list[bytes], names: int = 0) -> tuple[list[bytes], bool
             text = text.replace(b",", b" ")
         else:
             mark = b","
-    if not mark and b"\t" in text and _parts_cells(looked_at, names):
+    if text is not joined:
+        lines = text.split(b"\n")
+    if not mark and b"\t" in text and _parts_cells(lines[::step], names):
         mark = b"\t"
-    if not mark:
-        return text.split(b"\n"), False
-    return _filled(text, mark, looked_at)
+    return _filled(text, mark, lines[::step]) if mark else (lines, False)
 
 
 def _parts_cells(lines: list[bytes], names: int) -> bool:
@@ -169,17 +174,14 @@ def _filled(text: bytes, mark: bytes, looked_at: list[bytes]) -> tuple[list[byte
     Returns:
         As for `_blank_parted`.
     """
-    runs = [
-        cell.strip()
-        for line in looked_at
-        if b" " in line or b"\t" in line
-        for cell in line.split(mark)
-        if len(words := cell.split()) > 1
-        and all(is_number(word.replace(b",", b".")) for word in words)
+    cells = [[cell.split() for cell in line.split(mark)] for line in looked_at]
+    several = [
+        {k for k, of in enumerate(line) if _are_numbers(of[:1]) and of[1:]} for line in cells
     ]
+    is_exact = not set.intersection(*several) and min(map(len, cells)) > 1
+    runs = [b" ".join(cell) for line in cells for cell in line if cell[1:] and _are_numbers(cell)]
     if runs and mark != b"," and all(map(GROUPED_BY_BLANKS.fullmatch, runs)):
         raise InputError(f"has blanks inside numbers ({runs[0].decode()}); write none there")
-    is_exact = not runs
     if mark != b"\t":
         text = text.replace(b"\t", b" ")
     text = b"\n" + text + b"\n"
@@ -195,6 +197,11 @@ def _filled(text: bytes, mark: bytes, looked_at: list[bytes]) -> tuple[list[byte
     ):
         text = text.replace(empty, filled)
     return text[1:-1].replace(mark, b" ").split(b"\n"), is_exact
+
+
+def _are_numbers(words: list[bytes]) -> bool:
+    """Whether there are words, and all are numbers."""
+    return bool(words) and all(map(is_number, words))
 
 
 def _marks_decimals(words: list[list[bytes]], with_comma: list[bytes], names: int) -> bool:
@@ -258,13 +265,14 @@ def _cloud(lines: list[bytes]) -> Content:
     names = max((len(heading.names) for heading in headings if heading.axes), default=0)
     rows, is_exact = _blank_parted(kept, names)
     step = len(rows) // LOOKED_AT + 1
-    sample = [_words(row) for row in rows[::step]]
+    sample = [row.split() for row in rows[::step]]
     if min(map(len, sample)) < 3:
         raise InputError(_fault(lines, start, rows, [0, 1, 2]))
     if are_atoms(lines[:start], len(rows), sample):
         logger.warning("the first column holds atomic numbers: the coordinates are behind it")
-        return points_content(table(rows, (1, 2, 3)))
-    columns = columns_of(headings, sample, step, is_exact)
+        columns = Columns([1, 2, 3], [], [], is_whole=False, may_vary=True)
+    else:
+        columns = columns_of(headings, sample, step, is_exact)
     read = columns.axes + columns.others
     try:
         values = table(rows, None)[:, read] if columns.is_whole else table(rows, read)
@@ -301,11 +309,6 @@ def _head(lines: list[bytes]) -> tuple[int, list[Heading]]:
     return len(lines), headings
 
 
-def _words(row: bytes) -> list[bytes]:
-    """The words of a row, without a comment behind them."""
-    return row.split(b"#", 1)[0].split()
-
-
 def _fault(lines: list[bytes], start: int, rows: list[bytes], axes: list[int]) -> str:
     """What is wrong with the first row in which a coordinate is no number.
 
@@ -316,7 +319,7 @@ def _fault(lines: list[bytes], start: int, rows: list[bytes], axes: list[int]) -
         axes: the columns of x, y and z.
     """
     numbers = [at for at, line in enumerate(lines[start:], start + 1) if _rows([line])]
-    for number, words in zip(numbers, map(_words, rows), strict=True):
+    for number, words in zip(numbers, map(bytes.split, rows), strict=True):
         if len(words) <= max(axes):
             return f"has only {len(words)} columns in line {number}; x, y or z is missing"
         for axis, column in zip("xyz", axes, strict=True):

@@ -30,7 +30,8 @@ def test_a_first_column_numbers_the_rows_if_it_counts_up_by_one(tmp_path, first,
 
 
 @pytest.mark.parametrize(
-    ("last", "names"), [("0 1 0 7 8", ["column5", "intensity"]), ("0 1 0 7", [])]
+    ("last", "names"),
+    [("0 1 0 7 8", ["column5", "intensity"]), ("0 1 0 7", ["intensity"]), ("0 1 0", [])],
 )
 def test_columns_that_not_all_lines_have_are_left_out(tmp_path, last, names):
     cloud = read(tmp_path / "a.xyz", f"0 0 0 3 4\n1 0 0.5 5 6\n{last}\n")

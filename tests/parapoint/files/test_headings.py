@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from parapoint.errors import InputError
 from parapoint.files.reading import read_surface
+from parapoint.files.xyz import xyz
 from parapoint.surfaces.surface import PointCloud
 
 NORTH_FIRST = [[101.5, 200.25, 30.5], [102.5, 201.25, 31.5]]
@@ -41,6 +42,7 @@ def cloud_of(folder: Path, text: str | bytes, ending: str = ".xyz") -> PointClou
         "1001,200.25,101.5,30.5,GRND\n1005,201.25,102.5,31.5,big tree\n",
         "1001;200,25;101,5;30,5;GRND\n;201,25;102,5;31,5;\n",
         'A7|200.25|101.5|30.5|"wet, soft"\n"A 9"|201.25|102.5|31.5|"5,5"\n',
+        "7,200.25,101.5,30.5,a|b; c\n,201.25,102.5,31.5,d,e\n9,1,,2,f\n",
         "1001 200.25 101.5 30.5 GRND\n1005 201.25 102.5 31.5 big tree\n",
         "a b\t200.25\t101.5\t30.5\t\nc\t201.25\t102.5\t31.5\tGRND\n",
     ],
@@ -144,6 +146,7 @@ def test_comments_are_no_headings(
         ("# by hand\n\nz y x\n1 2 3\n4 5 A0\n", "has 'A0' in line 5, column 3, where x should be"),
         ("1 2 3\n4 5\n", "has only 2 columns in line 2; x, y or z is missing"),
         ("2\nmethane\nC 1 2 3\nH 4 5 6\n", "has 'C' in line 3, column 1"),
+        ("2\nmethane\n6 .1 2 3\n1 4 5 A0\n", "has 'A0' in line 4, column 4, where z should be"),
         ("<html>\n<body>\n", "has no point: none of its lines holds three numbers"),
         ("1\u00a0234,5;2;3\n", "no-break spaces between digits"),
         ("1 234,5;2;3\n4;5,5;6\n", r"has blanks inside numbers \(1 234.5\)"),
@@ -219,3 +222,22 @@ def test_a_pts_file_of_more_points_than_announced(
     with pytest.raises(InputError, match=f"{announced} points are announced, {found} are there"):
         cloud_of(tmp_path, text, ".pts")
     cloud_of(tmp_path, text.replace("4 5 6\n", "", 1), ".pts")
+
+
+@pytest.mark.parametrize("between", [" ", "\t", "\t\t", ",", ", ", ";", " ; ", ",\t", " | "])
+@pytest.mark.parametrize("point", [".", ","])
+def test_numbers_are_read_as_meant_or_refused(between: str, point: str) -> None:
+    """Below every head, and with notes, words or marks behind them."""
+    values = np.random.default_rng(5).normal(3, 50, (4, 7)).round(2)
+    for width in (3, 4, 6, 7):
+        lines = [
+            between.join(f"{x:.2f}".replace(".", point) for x in row[:width]) for row in values
+        ]
+        for head in ("", "# c\n", "4\n", "X Y Z\n", "//X;Y;Z\n", f"x{between}y{between}z\n"):
+            for behind in ("", between.strip(" "), " # note", " word", "\tword"):
+                text = head + "".join(f"{line}{behind}\n" for line in lines)
+                if between == point == ",":
+                    with pytest.raises(InputError, match="cannot be told"):
+                        xyz(text.encode())
+                else:
+                    assert_array_equal(xyz(text.encode()).vertices, values[:, :3], text)
