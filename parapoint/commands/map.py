@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import logging
+from pathlib import Path
 
 import click
 
@@ -10,8 +12,11 @@ from parapoint.commands.memory import memory_option
 from parapoint.commands.output import target, write
 from parapoint.commands.progress import bar
 from parapoint.commands.telling import ADVICE_OF_MAPS, lines, warn
-from parapoint.files.reading import read_surface
+from parapoint.files.reading import faults_of, read_surface
 from parapoint.fitting import Progress
+from parapoint.textures.baking import check_together
+
+logger = logging.getLogger("parapoint")
 
 
 @click.command("map", no_args_is_help=True, options_metavar="[OPTIONS] --out FILE")
@@ -37,11 +42,24 @@ def map_(model: str, surface: str, out: str, device: str, *, force: bool, as_jso
     with bar() as tell:
         tell(Progress("reading"))
         loaded, given = load(model, device=device), read_surface(surface)
+        with faults_of(Path(surface)):
+            on = check_together(loaded.mesh(), given, loaded.points_, least=0)
+        if on < 1:
+            logger.warning(
+                "%s: about %.3g %% of its points lie off the surface of the model: they get the UV "
+                "of its nearest places, or none where they lie far from it",
+                surface,
+                100 * (1 - on),
+            )
         facts = write(loaded, given, out, tell=tell)
     warn(facts, ADVICE_OF_MAPS)
     if as_json:
         print(json.dumps(facts))
         return
     print(lines(facts))
-    if count := facts.get("unmapped_points"):
-        print(f"{count} points lie far from the surface: rows {facts['unmapped_rows']} come first")
+    if count := int(str(facts.get("unmapped_points", 0))):
+        share = 100 * count / (count + int(str(facts["mapped_points"])))
+        print(
+            f"{count} points ({share:.3g} %) lie far from the surface and have no UV: "
+            f"rows {facts['unmapped_rows']} come first"
+        )

@@ -21,7 +21,7 @@ from parapoint.files.mesh_writers import (
 )
 from parapoint.files.obj_rewriting import rewrite_obj, write_library
 from parapoint.files.painting import Painting, Picture, bare_name, painting_of
-from parapoint.files.ply_rewriting import has_strips, rewrite_ply
+from parapoint.files.ply_rewriting import is_rewritable, rewrite_ply
 from parapoint.files.reading import Polygons, faults_of
 from parapoint.files.targets import checked_target
 from parapoint.surfaces.parameterization import Charted
@@ -70,7 +70,7 @@ class MeshOutput:
         pair = (self.source.suffix.lower(), self.out.suffix.lower())
         if pair not in REWRITTEN or self.chosen is not None:
             return False
-        return pair[0] != ".ply" or not has_strips(self.source)
+        return pair[0] != ".ply" or is_rewritable(self.source)
 
     @property
     def has_picture(self) -> bool:

@@ -117,7 +117,7 @@ def write(
         uv = unmapped(surface, _then(model.transform, placing)(points))
         nowhere = np.flatnonzero(np.isnan(uv[:, 0]))
         facts |= {"mapped_points": len(uv) - len(nowhere), "unmapped_points": len(nowhere)}
-        facts["unmapped_rows"] = nowhere[:NAMED].tolist()
+        facts["unmapped_rows"] = surface.rows_of(nowhere[:NAMED]).tolist()
         write_points(out, surface, uv)
     else:
         facts |= {"faces": len(charted.mesh.faces), "texture": size}

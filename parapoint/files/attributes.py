@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-GEOMETRY = {"x", "y", "z", "nx", "ny", "nz"}
+logger = logging.getLogger("parapoint")
+
+NORMAL_COLUMNS = (
+    ("nx", "ny", "nz"),
+    ("normal_x", "normal_y", "normal_z"),
+    ("normalx", "normaly", "normalz"),
+)
+"""Names under which the parts of a normal stand, in lower case: in PLY, PCD and LAS."""
+GEOMETRY = {"x", "y", "z", *NORMAL_COLUMNS[0]}
 COLOUR_COLUMNS = (
     ("red", "green", "blue", "alpha"),
     ("red", "green", "blue"),
     ("diffuse_red", "diffuse_green", "diffuse_blue"),
     ("r", "g", "b"),
 )
-"""Names under which the parts of a colour stand."""
+"""Names under which the parts of a colour stand, in lower case."""
+BRIGHT = 16
+"""Floats under the name of a colour are meant from 0 to 255 where one of them is over this. Those
+that are over 1 and not over this may as well be fractions that are too bright."""
 INTENSITIES = {"intensity", "scalar_intensity", "reflectance", "scalar_reflectance"}
 """Names under which the strength of a scanner's echo stands, in lower case."""
 
@@ -28,15 +40,47 @@ def named_attributes(columns: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDAr
     left = {name: of for name, of in columns.items() if name not in GEOMETRY}
     attributes = {}
     for names in COLOUR_COLUMNS:
-        if all(name in left for name in names):
-            chosen = [left.pop(name) for name in names]
-            colours = colours_of(np.stack(chosen, axis=1))
+        if found := _spelled(left, names):
+            colours = named_colours(np.stack([left[name] for name in found], axis=1))
             if colours is not None:
                 attributes["colours"] = colours
+                left = {name: of for name, of in left.items() if name not in found}
             break
     for name, values in left.items():
         attributes["intensity" if name.lower() in INTENSITIES else name] = values
     return attributes
+
+
+def taken_normals(columns: dict[str, npt.NDArray[Any]]) -> npt.NDArray[np.float64] | None:
+    """(P, 3) the normals among columns (P,), which are taken out of them; None without any."""
+    for names in NORMAL_COLUMNS:
+        if found := _spelled(columns, names):
+            return np.stack([columns.pop(name) for name in found], axis=1).astype(np.float64)
+    return None
+
+
+def _spelled(columns: dict[str, npt.NDArray[Any]], names: tuple[str, ...]) -> list[str]:
+    """These names as the columns spell them, in capitals or not; [] where one is missing."""
+    spelled = {name.lower(): name for name in columns}
+    return [spelled[name] for name in names] if set(names) <= set(spelled) else []
+
+
+def named_colours(values: npt.NDArray[Any]) -> npt.NDArray[Any] | None:
+    """(P, 3 or 4) numbers that their file calls colours, as `colours_of`, but with a warning.
+
+    They may also be floats from 0 to 255 that are not whole; these are rounded.
+    """
+    colours = colours_of(values)
+    if colours is None:
+        least, most = (float(of(values, initial=0)) for of in (np.min, np.max))
+        if least >= 0 and BRIGHT < most <= 255:
+            return np.asarray(np.rint(values), dtype=np.uint8)
+        logger.warning(
+            "colours left out: they go from %g to %g, but not from 0 to 1, 255 or 65535",
+            least,
+            most,
+        )
+    return colours
 
 
 def colours_of(values: npt.NDArray[Any]) -> npt.NDArray[Any] | None:

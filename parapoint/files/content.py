@@ -36,6 +36,7 @@ class Content:
         uv: (T, 2) texture coordinates, or None.
         uv_corners: like `corners`, rows of `uv`; NO_UV where a corner has none.
         attributes: whatever else is known at each vertex, (V,) or (V, k) by name; see `PointCloud`.
+        rows: (V,) row of each point among those of the file, where some were left out.
     """
 
     vertices: FloatArray
@@ -45,6 +46,7 @@ class Content:
     uv: FloatArray | None = None
     uv_corners: IntArray | None = None
     attributes: dict[str, npt.NDArray[Any]] = field(default_factory=dict)
+    rows: IntArray | None = None
 
 
 def points_content(
@@ -94,8 +96,8 @@ def word_counts(text: bytes, line_count: int) -> IntArray:
     characters = np.frombuffer(text, dtype=np.uint8)
     blank = characters <= 32
     first = ~blank & np.concatenate([[True], blank[:-1]])
-    line = np.concatenate([[0], np.cumsum(characters == ord("\n"))[:-1]])
-    return np.bincount(line[first], minlength=line_count)
+    line = np.searchsorted(np.flatnonzero(characters == ord("\n")), np.flatnonzero(first))
+    return np.bincount(line, minlength=line_count)
 
 
 def numbers(text: bytes, kind: type[np.float64 | np.int64]) -> npt.NDArray[Any]:

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import base64
 import json
+import logging
 import struct
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,6 +20,7 @@ import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from parapoint.errors import InputError
+from parapoint.files.attributes import srgb
 from parapoint.files.content import (
     NO_UV,
     Content,
@@ -36,10 +39,7 @@ UNDERSTOOD = {"KHR_mesh_quantization", "KHR_texture_transform", "EXT_mesh_gpu_in
 APPEARANCE = ("KHR_materials_", "KHR_lights_", "KHR_texture_basisu", "EXT_texture_", "KHR_xmp")
 """How names of extensions begin that change no vertex and no UV."""
 
-
-def glb(data: bytes, folder: Path) -> Content:
-    """The content of binary glTF 2; see `gltf`."""
-    return _of_glb(data, folder).content()
+logger = logging.getLogger("parapoint")
 
 
 def gltf(data: bytes, folder: Path) -> Content:
@@ -49,7 +49,7 @@ def gltf(data: bytes, folder: Path) -> Content:
     positions are exactly equal: seams of the UV are seams, not boundaries of the mesh. The UV are
     those of the first set, with v upwards as in OBJ.
     """
-    return _of_text(data, folder).content()
+    return _scene(data, folder).content()
 
 
 def opened(path: Path) -> Gltf:
@@ -58,15 +58,16 @@ def opened(path: Path) -> Gltf:
     Raises:
         InputError, ValueError, KeyError, IndexError, struct.error, TypeError: it is no such file.
     """
-    of = _of_glb if path.suffix.lower() == ".glb" else _of_text
-    return of(plain(path.read_bytes()), path.parent)
+    return _scene(plain(path.read_bytes()), path.parent)
 
 
-def _of_glb(data: bytes, folder: Path) -> Gltf:
-    """Binary glTF 2: a header and two chunks, JSON and data."""
-    magic, version, _ = struct.unpack_from("<4sII", data)
-    if magic != b"glTF" or version != 2:
-        raise InputError("is no binary glTF 2 file")
+def _scene(data: bytes, folder: Path) -> Gltf:
+    """The scene in a text, or in binary glTF: a header and two chunks, JSON and data."""
+    if not data.startswith(b"glTF"):
+        return Gltf(json.loads(data), folder, b"", len(data))
+    version = struct.unpack_from("<I", data, 4)[0]
+    if version != 2:
+        raise InputError(f"is binary glTF {version}; glTF 2 is read: convert it, or export it anew")
     length, kind = struct.unpack_from("<I4s", data, 12)
     if kind != b"JSON":
         raise InputError("has no JSON chunk")
@@ -75,11 +76,12 @@ def _of_glb(data: bytes, folder: Path) -> Gltf:
     if len(tail) >= 8:
         size, _ = struct.unpack_from("<I4s", tail)
         chunk = tail[8 : 8 + size]
-    return _of_text(data[20 : 20 + length], folder, chunk)
+    return Gltf(json.loads(data[20 : 20 + length]), folder, chunk, len(data))
 
 
-def _of_text(data: bytes, folder: Path, chunk: bytes = b"") -> Gltf:
-    return Gltf(json.loads(data), folder, chunk, len(data) + len(chunk))
+def draws_triangles(primitive: dict[str, Any]) -> bool:
+    """Whether a primitive is one of those whose triangles are read, in order."""
+    return "POSITION" in primitive["attributes"] and primitive.get("mode", 4) in {4, 5, 6}
 
 
 class Placed(NamedTuple):
@@ -108,7 +110,12 @@ class Gltf:
     """
 
     def __init__(self, tree: Any, folder: Path, chunk: bytes, size: int) -> None:
-        if not isinstance(tree, dict) or not tree.get("meshes"):
+        if not isinstance(tree, dict):
+            raise InputError("has no mesh")
+        version = str(tree.get("asset", {}).get("version", 2))
+        if version.partition(".")[0] != "2":
+            raise InputError(f"is glTF {version}; glTF 2 is read: convert it, or export it anew")
+        if not tree.get("meshes"):
             raise InputError("has no mesh")
         unknown = [
             name
@@ -314,17 +321,15 @@ class Gltf:
 
     def content(self) -> Content:
         """The scene as one content."""
-        positions, corners, uvs, uv_corners, points = [], [], [], [], []
+        positions, corners, uvs, uv_corners = [], [], [], []
         vertex_count = uv_count = decoded = 0
-        for placed in self.placed_primitives():
+        placed_primitives = self.placed_primitives()
+        if not any(draws_triangles(placed.primitive) for placed in placed_primitives):
+            return self._points(placed_primitives)
+        for placed in _told(placed_primitives, draws_triangles):
             primitive, transform = placed.primitive, placed.transform
             attributes = primitive["attributes"]
             place = self._positions(placed)
-            mode = primitive.get("mode", 4)
-            if mode == 0:
-                points.append(place)
-            if mode not in {4, 5, 6}:
-                continue
             turned = self.triangles(primitive)
             if np.linalg.det(transform[:3, :3]) < 0:  # a mirror image turns the faces round
                 turned = turned[:, ::-1]
@@ -347,16 +352,72 @@ class Gltf:
                 uv_count += len(uv)
             else:
                 uv_corners.append(np.full(len(triangles), NO_UV))
-        if not corners:
-            if points:
-                return points_content(np.concatenate(points))
-            raise InputError("has no triangle and no point")
         vertices, row = welded(np.concatenate(positions))
         flat = np.concatenate(corners)
         content = Content(vertices, np.full(len(flat) // 3, 3), row[flat])
         if uvs:
             content.uv, content.uv_corners = np.concatenate(uvs), np.concatenate(uv_corners)
         return content
+
+    def _points(self, placed_primitives: list[Placed]) -> Content:
+        """The points of a scene without triangles, with their colours if some have any."""
+        points, colours, decoded = [], [], 0
+        for placed in _told(placed_primitives, _draws_points):
+            primitive = placed.primitive
+            place = self._positions(placed)
+            rows = np.arange(len(place))
+            if "indices" in primitive:
+                rows = whole(self.accessor(primitive["indices"])).reshape(-1)
+                if rows.min() < 0 or rows.max() >= len(place):
+                    raise InputError(f"a vertex index is out of range (0 to {len(place) - 1})")
+            colour = self._colours(primitive, len(place))
+            decoded += place.nbytes + rows.nbytes
+            check_decoded(4 * decoded, self.size)
+            points.append(place[rows])
+            colours.append(colour[rows])
+        if not points:
+            raise InputError("has no triangle and no point")
+        attributes = {}
+        if any("COLOR_0" in placed.primitive["attributes"] for placed in placed_primitives):
+            parts = np.concatenate(colours)
+            attributes["colours"] = parts if (parts[:, 3] < 1).any() else parts[:, :3]
+        return points_content(np.concatenate(points), attributes=attributes)
+
+    def _colours(self, primitive: dict[str, Any], count: int) -> npt.NDArray[np.float32]:
+        """(count, 4) sRGB of vertices: the material's colour times theirs, both linear in glTF."""
+        number = primitive.get("material")
+        material = {} if number is None else self.tree["materials"][number]
+        colours = np.ones((count, 4))
+        colours *= material.get("pbrMetallicRoughness", {}).get("baseColorFactor", 1)
+        if (index := primitive["attributes"].get("COLOR_0")) is not None:
+            given = self.stored(index)
+            if len(given) != count:
+                raise InputError(f"has {len(given)} colours for {count} vertices")
+            most = 1.0 if given.dtype.kind == "f" else float(np.iinfo(given.dtype).max)
+            colours[:, : given.shape[1]] *= given / most
+        colours = np.clip(np.nan_to_num(colours), 0, 1)
+        colours[:, :3] = srgb(colours[:, :3])
+        return colours.astype(np.float32)
+
+
+def _draws_points(primitive: dict[str, Any]) -> bool:
+    return "POSITION" in primitive["attributes"] and primitive.get("mode", 4) == 0
+
+
+def _told(placed: list[Placed], is_read: Callable[[dict[str, Any]], bool]) -> list[Placed]:
+    """The primitives that are read; a warning counts the others."""
+    read = [one for one in placed if is_read(one.primitive)]
+    others = [one.primitive for one in placed if not is_read(one.primitive)]
+    if others:
+        bare = sum("POSITION" not in primitive["attributes"] for primitive in others)
+        logger.warning(
+            "%d of %d primitives are not mapped: %d without POSITION, %d of points or lines",
+            len(others),
+            len(placed),
+            bare,
+            len(others) - bare,
+        )
+    return read
 
 
 def _node_transform(node: dict[str, Any]) -> FloatArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import struct
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from parapoint.errors import InputError
-from parapoint.files.gltf import Gltf, opened
+from parapoint.files.gltf import Gltf, draws_triangles, opened
 from parapoint.files.png import png
 from parapoint.files.targets import complete_file
 from parapoint.surfaces.parameterization import Parameterization
@@ -23,6 +24,12 @@ TRIANGLES = 4
 VERTEX_BUFFER, INDEX_BUFFER = 34962, 34963
 FLOAT, WHOLE = 5126, 5125
 """glTF's numbers of float32 and uint32."""
+DATA = {"accessor", "attributes", "buffer", "bufferView", "indices"}
+"""Keys under which extensions, as those of compression, number buffers, views and accessors."""
+TABLES = {"EXT_structural_metadata", "EXT_mesh_features", "EXT_instance_features"}
+"""Extensions of tables that lie in buffer views, or point into such tables."""
+
+logger = logging.getLogger("parapoint")
 
 
 def check_rewritable(source: Path) -> None:
@@ -56,6 +63,7 @@ def rewrite_gltf(
     """
     scene = opened(source)
     tree = scene.tree
+    _drop_extensions(tree)
     placed = scene.placed_primitives()
     uv_set = _free_set(tree)
     made = _Made(scene)
@@ -65,7 +73,7 @@ def rewrite_gltf(
     begin = 0
     for one in placed:
         primitive = one.primitive
-        if primitive.get("mode", TRIANGLES) not in {4, 5, 6}:
+        if not draws_triangles(primitive):
             primitives.append(primitive)
             continue
         faces = scene.triangles(primitive)
@@ -99,6 +107,36 @@ def _place(
         done.add(node["mesh"])
         mesh = meshes[node["mesh"]]
         mesh["primitives"] = [next(primitives) for _ in mesh["primitives"]]
+
+
+def _drop_extensions(tree: dict[str, Any]) -> None:
+    """Drop the extensions that name data by number, since these are numbered anew; a line tells."""
+    held = list(_extensions(tree))
+    names = {name for of in held for name, value in of.items() if name in TABLES or _has_key(value)}
+    for of in held:
+        for name in names & of.keys():
+            del of[name]
+    for key in ("extensionsUsed", "extensionsRequired"):
+        left = [name for name in tree.pop(key, []) if name not in names]
+        tree |= {key: left} if left else {}
+    if names:
+        logger.warning("left out of the copy, which is plain: %s", ", ".join(sorted(names)))
+
+
+def _extensions(value: Any) -> Iterator[dict[str, Any]]:
+    """The extensions of each part of the JSON, by name."""
+    if isinstance(value, dict) and isinstance(held := value.get("extensions"), dict):
+        yield held
+    for part in value.values() if isinstance(value, dict) else value:
+        if isinstance(part, dict | list):
+            yield from _extensions(part)
+
+
+def _has_key(value: Any) -> bool:
+    """Whether a part of the JSON has a key of DATA."""
+    if isinstance(value, dict):
+        return not DATA.isdisjoint(value) or any(map(_has_key, value.values()))
+    return isinstance(value, list) and any(map(_has_key, value))
 
 
 def _free_set(tree: dict[str, Any]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import logging
+import math
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from parapoint.errors import InputError
-from parapoint.files.attributes import named_attributes
+from parapoint.files.attributes import named_attributes, taken_normals
 from parapoint.files.content import Content, points_content
 from parapoint.files.decoding import check_decoded, plain
 
@@ -88,7 +89,10 @@ def _content(points: laspy.ScaleAwarePointRecord) -> Content:
     # A coordinate that leaves the numbers is dropped later, and counted.
     with np.errstate(over="ignore", invalid="ignore"):
         places = [np.asarray(points[axis], dtype=np.float64)[kept] for axis in "xyz"]
-    return points_content(np.stack(places, axis=1), attributes=named_attributes(columns))
+    normals = taken_normals(columns)
+    content = points_content(np.stack(places, axis=1), normals, named_attributes(columns))
+    content.rows = None if kept.all() else np.flatnonzero(kept)
+    return content
 
 
 def _warn_of_noise(kept: int, count: int) -> None:
@@ -121,6 +125,9 @@ def check_header(head: bytes, length: int) -> None:
         raise InputError("has no LAS header")
     if head[24:25] != b"\x01":  # laspy goes by the minor version alone
         raise InputError(f"is of LAS version {head[24]}.{head[25]}; 1.0 to 1.4 are read")
+    for axis, scale in zip("xyz", struct.unpack_from("<3d", head, 131), strict=True):
+        if scale == 0 or not math.isfinite(scale):
+            raise InputError(f"has the scale {scale:g} for {axis}, by which no place can be told")
     # laspy makes room for whatever the header announces, be it four thousand million points.
     start, records, kind, width, points = struct.unpack_from("<IIBHI", head, 96)
     extended = 0

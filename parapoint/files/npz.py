@@ -7,12 +7,16 @@ import io
 import numpy as np
 
 from parapoint.errors import InputError
+from parapoint.files.attributes import named_colours
 from parapoint.files.content import Content, points_content
 from parapoint.files.decoding import opened_archive
 
 
 def npz(data: bytes) -> Content:
-    """Arrays points, normals and whatever else is known; or vertices, faces, uv and corners."""
+    """Arrays points, normals and whatever else is known; or vertices, faces, uv and corners.
+
+    "colors" are "colours", of any type: open3d and trimesh call them so.
+    """
     if not data:
         raise InputError("is empty")
     with opened_archive(io.BytesIO(data)) as file:
@@ -25,6 +29,8 @@ def npz(data: bytes) -> Content:
         if "uv" in arrays:
             uv_corners = _whole(arrays, "corners" if "corners" in arrays else "faces")
             content.uv, content.uv_corners = arrays["uv"], uv_corners.reshape(-1)
+        given = arrays.get("colours", arrays.get("colors"))
+        content.attributes = _colours(given, len(content.vertices))
         return content
     if "points" not in arrays:
         raise InputError("has no array 'points'; a point map has points and uv")
@@ -34,7 +40,22 @@ def npz(data: bytes) -> Content:
     if "uv" in arrays and "uv" not in others:
         raise InputError(f"has {len(np.atleast_1d(arrays['uv']))} uv rows for {len(points)} points")
     del others["points"]
+    if "colours" not in others and (colours := _colours(others.get("colors"), len(points))):
+        del others["colors"]
+        others |= colours
     return points_content(points, normals, others)
+
+
+def _colours(given: np.ndarray | None, count: int) -> dict[str, np.ndarray]:
+    """The attribute "colours" of `count` points, {} where the array holds none."""
+    if (
+        given is None
+        or given.shape not in {(count, 3), (count, 4)}
+        or given.dtype.kind not in "fiu"
+    ):
+        return {}
+    colours = named_colours(given)
+    return {} if colours is None else {"colours": colours}
 
 
 def _coordinates(arrays: dict[str, np.ndarray], name: str) -> np.ndarray:

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from parapoint.errors import InputError
+from parapoint.files.attributes import srgb
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray
 
 MOST_TEXELS = 16_384
@@ -166,14 +167,15 @@ def _ply(path: Path) -> tuple[tuple[Material, ...], IntArray]:
 
 
 def _gltf(path: Path) -> tuple[tuple[Material, ...], IntArray]:
-    from parapoint.files.gltf import opened
+    from parapoint.files.gltf import draws_triangles, opened
 
     tree = opened(path)
     pictures: dict[int, Picture] = {}
     materials = []
     for given in tree.tree.get("materials", []):
         base = given.get("pbrMetallicRoughness", {})
-        red, green, blue = (_srgb(part) for part in base.get("baseColorFactor", (1, 1, 1))[:3])
+        linear = np.clip(np.array(base.get("baseColorFactor", (1, 1, 1))[:3], np.float64), 0, 1)
+        red, green, blue = np.rint(255 * srgb(linear)).astype(int).tolist()
         texture = base.get("baseColorTexture", {}).get("index")
         source = None if texture is None else tree.tree["textures"][texture].get("source")
         if source is not None and source not in pictures:
@@ -183,12 +185,6 @@ def _gltf(path: Path) -> tuple[tuple[Material, ...], IntArray]:
     of = [
         np.full(len(tree.triangles(one)), one.get("material", len(materials) - 1))
         for one in (placed.primitive for placed in tree.placed_primitives())
-        if one.get("mode", 4) in {4, 5, 6}
+        if draws_triangles(one)
     ]
     return tuple(materials), np.concatenate(of)
-
-
-def _srgb(linear: float) -> int:
-    """A part of a linear colour, as 8-bit sRGB."""
-    part = min(max(float(linear), 0), 1)
-    return round(255 * (12.92 * part if part <= 0.0031308 else 1.055 * part ** (1 / 2.4) - 0.055))

@@ -13,14 +13,14 @@ import numpy as np
 import numpy.typing as npt
 
 from parapoint.errors import InputError
-from parapoint.files.attributes import named_attributes
-from parapoint.files.content import Content, points_content
+from parapoint.files.attributes import named_attributes, taken_normals
+from parapoint.files.content import Content, points_content, word_counts
 from parapoint.files.decoding import check_decoded
 from parapoint.files.xyz import table, text_lines
+from parapoint.surfaces.surface import FloatArray
 
 PACKED = {"rgb": 3, "rgba": 4}
 """Fields that hold the bytes blue, green, red (and alpha) of a colour, and how many count."""
-PCD_NORMALS = ("normal_x", "normal_y", "normal_z")
 
 
 def pcd(data: bytes) -> Content:
@@ -36,11 +36,11 @@ def pcd(data: bytes) -> Content:
     wanted = [k for k, name in enumerate(fields) if counts[k] == 1 and name != "_"]
     if encoding == "ascii":
         places = np.cumsum([0, *counts]).tolist()
-        values = table(text_lines(body)[:count], tuple(places[k] for k in wanted))
-        if len(values) != count:
-            raise InputError(f"ends early: {count} points are announced, {len(values)} follow")
+        lines = text_lines(body)
+        _check_rows(lines, count, sum(counts))
+        values = table(lines, tuple(places[k] for k in wanted))
         columns = {
-            fields[k]: values[:, at].astype(kinds[k] if fields[k] in PACKED else np.float64)
+            fields[k]: _packed(values[:, at], kinds[k]) if fields[k] in PACKED else values[:, at]
             for at, k in enumerate(wanted)
         }
     else:
@@ -60,10 +60,40 @@ def pcd(data: bytes) -> Content:
             for k in wanted
         }
     points = np.stack([columns.pop(axis) for axis in "xyz"], axis=1).astype(np.float64)
-    normals = None
-    if set(PCD_NORMALS) <= set(columns):
-        normals = np.stack([columns.pop(name) for name in PCD_NORMALS], axis=1).astype(np.float64)
+    normals = taken_normals(columns)
     return points_content(points, normals, _pcd_attributes(columns))
+
+
+def _check_rows(lines: list[bytes], count: int, width: int) -> None:
+    """Check that the lines of a text file are as many as its header announces, and as long.
+
+    Raises:
+        InputError: they are not.
+    """
+    found = word_counts(b"\n".join(lines), len(lines))
+    wrong = np.flatnonzero(found != width)
+    if len(wrong):
+        row = int(wrong[0])
+        raise InputError(
+            f"holds {found[row]} numbers in row {row} of its points (the first is row 0), and the "
+            f"header announces {width}"
+        )
+    if len(lines) != count:
+        early = "ends early: " if len(lines) < count else ""
+        raise InputError(f"{early}{count} points are announced, {len(lines)} follow")
+
+
+def _packed(values: FloatArray, kind: np.dtype[np.generic]) -> npt.NDArray[Any]:
+    """The four bytes of packed colours, as text files have them.
+
+    Text is a float that has these bytes or a whole number, with a sign or not, whatever its type.
+    """
+    is_whole = (np.floor(values) == values) & (np.abs(values) < 2**32)
+    if kind.kind == "f" and not is_whole.all():
+        return values.astype(np.float32)
+    if not is_whole.all():
+        raise InputError("has a packed colour that is no whole number of 32 bits")
+    return values.astype(np.int64).astype(np.uint32)
 
 
 def _pcd_attributes(columns: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
@@ -101,6 +131,9 @@ def _pcd_header(
         np.dtype(f"<{codes[kind]}{int(size)}")
         for kind, size in zip(header["TYPE"], header["SIZE"], strict=True)
     ]
+    twice = {name for name in fields if name != "_" and fields.count(name) > 1}
+    if twice:
+        raise InputError(f"has the field {min(twice)!r} twice; give each a name of its own")
     counts = [int(word) for word in header.get("COUNT", ["1"] * len(fields))]
     if not len(fields) == len(kinds) == len(counts) or min(counts, default=-1) < 0:
         raise InputError("has a header whose FIELDS, SIZE, TYPE and COUNT do not agree")

@@ -5,6 +5,7 @@ Ours, since trimesh takes PLY triangle strips for points and mixed binary polygo
 
 from __future__ import annotations
 
+import logging
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,27 +16,42 @@ import numpy as np
 import numpy.typing as npt
 
 from parapoint.errors import InputError
-from parapoint.files.attributes import GEOMETRY, named_attributes
+from parapoint.files.attributes import GEOMETRY, named_attributes, taken_normals
 from parapoint.files.content import (
     NO_UV,
     Content,
-    floats,
-    integers,
-    plain_numbers,
     points_content,
     ranges,
     strip_triangles,
     whole,
 )
+from parapoint.files.ply_body import (
+    BLOCK,
+    Body,
+    Property,
+    declared,
+    row_starts,
+    run_of_values,
+    text_body,
+    walked,
+)
 from parapoint.surfaces.surface import FloatArray, IntArray
 
-BLOCK = 1 << 20
-"""Units of a file, bytes or numbers of a text file, among which rows are looked for at once."""
+logger = logging.getLogger("parapoint")
+
 HEADER_END = re.compile(rb"[\r\n]end_header[ \t\r]*\n")
+CR_BEGIN, CR_HEADER_END = re.compile(rb"ply[ \t]*\r(?!\n)"), re.compile(rb"\rend_header[ \t]*\r")
+"""How a header begins and ends whose lines end with CR alone."""
 INDICES = {"vertex_indices", "vertex_index"}
+LISTS = {*INDICES, "texcoord"}
+"""Lists that are read."""
+POLYGONS = {"face", "tristrips"}
+"""Elements that hold polygons."""
 UV_COLUMNS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texcoord_u", "texcoord_v"))
 """Names under which the UV of vertices stand."""
 
+ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+"""The byte order of each format of a PLY file, as numpy writes it; none of text."""
 PLY_TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
     **dict.fromkeys(("uchar", "uint8"), "u1"),
@@ -45,43 +61,10 @@ PLY_TYPES = {
     **dict.fromkeys(("uint", "uint32"), "u4"),
     **dict.fromkeys(("long", "int64"), "i8"),
     **dict.fromkeys(("ulong", "uint64"), "u8"),
+    **dict.fromkeys(("half", "float16"), "f2"),
     **dict.fromkeys(("float", "float32"), "f4"),
     **dict.fromkeys(("double", "float64"), "f8"),
 }
-
-
-@dataclass
-class _Property:
-    """A scalar of a PLY element, or a list where `count_type` is given (numpy type codes)."""
-
-    name: str
-    type: np.dtype[Any]
-    count_type: np.dtype[Any] | None
-
-
-@dataclass
-class _Body:
-    """The data of a PLY file: bytes, or the numbers of a text file, where each is one unit wide."""
-
-    raw: bytes
-    numbers: FloatArray | None
-
-    @property
-    def size(self) -> int:
-        """Length in units."""
-        return len(self.raw) if self.numbers is None else len(self.numbers)
-
-    def width(self, kind: np.dtype[Any]) -> int:
-        """Units of one value."""
-        return kind.itemsize if self.numbers is None else 1
-
-    def values(self, at: IntArray, kind: np.dtype[Any]) -> FloatArray:
-        """The values that start at these units."""
-        if self.numbers is not None:
-            return np.asarray(self.numbers[at], dtype=np.float64)
-        pool = np.frombuffer(self.raw, dtype=np.uint8)
-        chosen = pool[at[:, None] + np.arange(kind.itemsize)]
-        return np.asarray(chosen.view(kind).reshape(-1), dtype=np.float64)
 
 
 @dataclass
@@ -132,39 +115,55 @@ def opened(data: bytes) -> tuple[list[str], list[Table]]:
     tables = []
     for name, count, properties in elements:
         columns, at = _columns(body, at, count, properties)
-        kinds = zip(properties, columns, strict=True)
-        named = {
-            item.name: Column(values.astype(item.type.newbyteorder("=")), sizes)
-            for item, (values, sizes) in kinds
-        }
-        tables.append(Table(name, count, named))
+        pairs = zip(properties, columns, strict=True)
+        tables.append(Table(name, count, {item.name: Column(*one) for item, one in pairs}))
+    body.check_end(at)
     return comments, tables
 
 
 def _columns(
-    body: _Body, at: int, count: int, properties: list[_Property]
-) -> tuple[list[tuple[FloatArray, IntArray | None]], int]:
+    body: Body, at: int, count: int, properties: list[Property]
+) -> tuple[list[tuple[npt.NDArray[Any], IntArray | None]], int]:
     """Values and sizes of each property, and the unit behind the element."""
-    starts, sizes, end = _walk(body, at, count, properties)
+    starts, sizes, end = walked(body, at, count, properties)
     return [
         (
-            _run_of_values(body, starts[:, k], sizes[:, k], item.type),
+            declared(run_of_values(body, starts[:, k], sizes[:, k], item.type), item.type),
             None if item.count_type is None else sizes[:, k],
         )
         for k, item in enumerate(properties)
     ], end
 
 
-def _parts(data: bytes) -> tuple[list[tuple[str, int, list[_Property]]], _Body]:
-    """The elements and the body of a PLY file."""
-    closing = HEADER_END.search(data)
+List = tuple[IntArray, npt.NDArray[Any]]
+"""Lengths of the lists of all rows, and their values in one run."""
+Element = tuple[str, int, list[Property]]
+"""Name, count and properties of an element."""
+
+
+def header_of(data: bytes) -> tuple[str, list[Element], int] | None:
+    """The byte order ("" for text, "<" or ">"), the elements, and where the body begins.
+
+    None where the data begin with no header.
+
+    Raises:
+        InputError: the header says what PLY does not have.
+    """
+    closing = (CR_HEADER_END if CR_BEGIN.match(data) else HEADER_END).search(data)
     if not data.startswith(b"ply") or data[3:4].strip() or closing is None:
+        return None
+    encoding, elements = _ply_header(data[3 : closing.start()].decode("latin-1").splitlines())
+    return encoding, elements, closing.end()
+
+
+def _parts(data: bytes) -> tuple[list[Element], Body]:
+    """The elements and the body of a PLY file."""
+    header = header_of(data)
+    if header is None:
         raise InputError("has no PLY header")
-    end, body_begin = closing.span()
-    encoding, elements = _ply_header(data[3:end].decode("latin-1").splitlines())
-    raw = data[body_begin:]
-    body = _Body(raw, None if encoding else floats(plain_numbers(raw).split(), 1).reshape(-1))
-    return elements, body
+    encoding, elements, begin = header
+    raw = data[begin:]
+    return elements, Body(raw) if encoding else text_body(raw, len(data[:begin].splitlines()) + 1)
 
 
 def ply_pieces(path: Path, size: int) -> Iterator[Content] | None:
@@ -177,23 +176,23 @@ def ply_pieces(path: Path, size: int) -> Iterator[Content] | None:
     """
     with path.open("rb") as stream:
         head = stream.read(BLOCK)
-    closing = HEADER_END.search(head)
-    if not head.startswith(b"ply") or closing is None:
+    header = header_of(head)
+    if header is None:
         return None
-    encoding, elements = _ply_header(head[3 : closing.start()].decode("latin-1").splitlines())
+    encoding, elements, begin = header
     if not encoding or not elements or any(count for _, count, _ in elements[1:]):
         return None
     name, count, properties = elements[0]
     width = sum(item.type.itemsize for item in properties)
     if name != "vertex" or any(item.count_type is not None for item in properties):
         return None
-    if path.stat().st_size < closing.end() + count * width:
+    if path.stat().st_size < begin + count * width:
         raise _ends_early(count)
-    return _pieces_of_rows(path, closing.end(), count, properties, size)
+    return _pieces_of_rows(path, begin, count, properties, size)
 
 
 def _pieces_of_rows(
-    path: Path, begin: int, count: int, properties: list[_Property], size: int
+    path: Path, begin: int, count: int, properties: list[Property], size: int
 ) -> Iterator[Content]:
     """The `count` rows of a file from a byte on, `size` at a time."""
     width = sum(item.type.itemsize for item in properties)
@@ -201,7 +200,7 @@ def _pieces_of_rows(
         stream.seek(begin)
         for first in range(0, count, size):
             rows = min(size, count - first)
-            body = _Body(stream.read(rows * width), None)
+            body = Body(stream.read(rows * width))
             columns, _ = _ply_table(body, 0, rows, properties)
             yield points_content(*_points_of(columns))
 
@@ -211,24 +210,40 @@ def ply(data: bytes) -> Content:
     elements, body = _parts(data)
     at = 0
     columns: dict[str, npt.NDArray[Any]] = {}
-    sizes = corners = np.zeros(0, dtype=np.int64)
-    wedges: tuple[IntArray, FloatArray] | None = None
+    none, no_uv = np.zeros(0, dtype=np.int64), np.zeros(0)
+    parts = [(none, none, none, no_uv)]
     for name, count, properties in elements:
         if name == "vertex":
             columns, at = _ply_table(body, at, count, properties)
-        else:
-            begin = at
-            sizes_here, values, at = _ply_lists(body, begin, count, properties, INDICES)
-            if name == "face":
-                sizes, corners = sizes_here, whole(values)
-                if any(item.name == "texcoord" for item in properties):
-                    wedges = _ply_lists(body, begin, count, properties, {"texcoord"})[:2]
-            elif name == "tristrips":
-                triangles = strip_triangles(sizes_here, whole(values))
-                sizes, corners = np.full(len(triangles), 3), triangles.reshape(-1)
-    uv, uv_corners = _ply_uv(columns, corners, sizes, wedges) if len(sizes) else (None, None)
+            continue
+        lists, at = _ply_lists(body, at, count, properties)
+        indices = next((of for key, of in lists.items() if key in INDICES), None)
+        if name not in POLYGONS:
+            if indices is not None and count:
+                logger.warning("%d rows of the element %r left out: it is not known", count, name)
+        elif indices is not None:
+            parts.append(_polygons(name, indices, lists.get("texcoord")))
+        elif count:
+            named = ", ".join(item.name for item in properties) or "nothing"
+            raise InputError(f"has {count} rows of {name} with {named}, but without vertex_indices")
+    body.check_end(at)
+    sizes, corners, uv_sizes, uv = (np.concatenate(part) for part in zip(*parts, strict=True))
+    wedges = _ply_uv(columns, corners, sizes, uv_sizes, uv) if len(sizes) else (None, None)
     vertices, normals, attributes = _points_of(columns)
-    return Content(vertices, sizes, corners, normals, uv, uv_corners, attributes)
+    return Content(vertices, sizes, corners, normals, *wedges, attributes)
+
+
+def _polygons(
+    name: str, indices: List, texcoord: List | None
+) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
+    """Sizes and corners of the polygons of an element, and sizes and values of their UV."""
+    sizes, corners = indices[0], whole(indices[1])
+    if name == "tristrips":
+        triangles = strip_triangles(sizes, corners)
+        sizes, corners, texcoord = np.full(len(triangles), 3), triangles.reshape(-1), None
+    if texcoord is None:
+        return sizes, corners, np.zeros_like(sizes), np.zeros(0)
+    return sizes, corners, texcoord[0], texcoord[1].astype(np.float64)
 
 
 def _points_of(
@@ -237,9 +252,7 @@ def _points_of(
     """The positions, the normals if there are any, and the attributes of the rows of a table."""
     if not all(axis in columns for axis in "xyz"):
         raise InputError("has no vertex element with x, y and z")
-    normals = None
-    if all(axis in columns for axis in ("nx", "ny", "nz")):
-        normals = _stacked(columns, "nx", "ny", "nz")
+    normals = taken_normals(columns)
     return _stacked(columns, "x", "y", "z"), normals, named_attributes(columns)
 
 
@@ -247,17 +260,18 @@ def _ply_uv(
     columns: dict[str, npt.NDArray[Any]],
     corners: IntArray,
     sizes: IntArray,
-    wedges: tuple[IntArray, FloatArray] | None,
+    counts: IntArray,
+    values: FloatArray,
 ) -> tuple[FloatArray | None, IntArray | None]:
-    """UV and their rows at the corners: of the vertices, or of each face's list "texcoord"."""
+    """UV and their rows at the corners: of the vertices, or of each face's list "texcoord".
+
+    `counts` and `values` are the lengths of these lists, and their numbers in one run.
+    """
     for names in UV_COLUMNS:
         if all(name in columns for name in names):
             pair = [columns.pop(name).astype(np.float64) for name in names]
             return np.stack(pair, axis=1), corners
-    if wedges is None or len(wedges[1]) == 0:
-        return None, None
-    counts, values = wedges
-    if ((counts != 2 * sizes) & (counts != 0)).any():
+    if len(values) == 0 or ((counts != 2 * sizes) & (counts != 0)).any():
         return None, None  # of something else than corners
     has_uv = np.repeat(counts > 0, sizes)
     rows = np.where(has_uv, np.cumsum(has_uv) - 1, NO_UV)
@@ -269,28 +283,24 @@ def _stacked(columns: dict[str, npt.NDArray[Any]], *names: str) -> FloatArray:
     return np.stack([columns[name] for name in names], axis=1, dtype=np.float64, casting="unsafe")
 
 
-def _ply_header(lines: list[str]) -> tuple[str, list[tuple[str, int, list[_Property]]]]:
+def _ply_header(lines: list[str]) -> tuple[str, list[Element]]:
     """The byte order ("" for text, "<" or ">"), and name, count and properties of each element."""
     encoding = ""
-    elements: list[tuple[str, int, list[_Property]]] = []
+    elements: list[Element] = []
     for line in lines:
         words = line.split()
         match words:
             case ["format", kind, *_]:
-                orders = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
-                encoding = orders[kind]
+                if kind not in ORDERS:
+                    raise InputError(f"is of the format {kind!r}; known are {', '.join(ORDERS)}")
+                encoding = ORDERS[kind]
             case ["element", name, count]:
                 elements.append((name, int(count), []))
             case ["property", "list", count_kind, kind, name]:
-                elements[-1][2].append(
-                    _Property(
-                        name,
-                        np.dtype(encoding + PLY_TYPES[kind]),
-                        np.dtype(encoding + PLY_TYPES[count_kind]),
-                    )
-                )
+                kinds = _type(encoding, kind, line), _type(encoding, count_kind, line)
+                elements[-1][2].append(Property(name, *kinds))
             case ["property", kind, name]:
-                elements[-1][2].append(_Property(name, np.dtype(encoding + PLY_TYPES[kind]), None))
+                elements[-1][2].append(Property(name, _type(encoding, kind, line), None))
             case ["comment" | "obj_info", *_] | []:
                 pass
             case _:
@@ -300,28 +310,35 @@ def _ply_header(lines: list[str]) -> tuple[str, list[tuple[str, int, list[_Prope
     return encoding, elements
 
 
+def _type(encoding: str, kind: str, line: str) -> np.dtype[Any]:
+    """The type of this name in PLY."""
+    if kind not in PLY_TYPES:
+        raise InputError(f"has a type that PLY does not know in its header line {line[:60]!r}")
+    return np.dtype(encoding + PLY_TYPES[kind])
+
+
 def _ends_early(count: int) -> InputError:
     return InputError(f"ends early: {count} vertices are announced")
 
 
 def _ply_table(
-    body: _Body, at: int, count: int, properties: list[_Property]
+    body: Body, at: int, count: int, properties: list[Property]
 ) -> tuple[dict[str, npt.NDArray[Any]], int]:
     """Columns of an element without lists, by property name, and the unit behind it."""
     if any(item.count_type is not None for item in properties):
         raise InputError("has lists among its vertex properties, which is not read")
     if not properties:
         return {}, at
-    width = sum(body.width(item.type) for item in properties)
-    end = at + count * width
-    if end > body.size:
-        raise _ends_early(count)
     if body.numbers is not None:
-        rows = body.numbers[at:end].reshape(count, width)
+        _, end = row_starts(body, at, count, properties)
+        rows = body.numbers[at:end].reshape(count, len(properties))
         return {
-            item.name: rows[:, k].astype(item.type if item.name not in GEOMETRY else np.float64)
+            item.name: rows[:, k] if item.name in GEOMETRY else declared(rows[:, k], item.type)
             for k, item in enumerate(properties)
         }, end
+    end = at + count * sum(item.type.itemsize for item in properties)
+    if end > body.size:
+        raise _ends_early(count)
     kind = np.dtype([(f"{k}", item.type) for k, item in enumerate(properties)])
     table = np.frombuffer(body.raw, kind, count, at)
     return {
@@ -331,92 +348,14 @@ def _ply_table(
 
 
 def _ply_lists(
-    body: _Body, at: int, count: int, properties: list[_Property], names: set[str]
-) -> tuple[IntArray, FloatArray, int]:
-    """Lengths and values of an element's list of these names, and the unit behind the element."""
-    if all(item.count_type is None for item in properties):
-        end = at + count * sum(body.width(item.type) for item in properties)
-        return np.zeros(0, dtype=np.int64), np.zeros(0), end
-    starts, sizes, end = _walk(body, at, count, properties)
-    for k, item in enumerate(properties):
-        if item.name in names and item.count_type is not None:
-            return sizes[:, k], _run_of_values(body, starts[:, k], sizes[:, k], item.type), end
-    return np.zeros(0, dtype=np.int64), np.zeros(0), end
-
-
-def _run_of_values(
-    body: _Body, starts: IntArray, sizes: IntArray, kind: np.dtype[Any]
-) -> FloatArray:
-    """All values of lists that start at these units and have these sizes."""
-    within = ranges(np.zeros_like(sizes), sizes)
-    return body.values(np.repeat(starts, sizes) + body.width(kind) * within, kind)
-
-
-def _walk(
-    body: _Body, at: int, count: int, properties: list[_Property]
-) -> tuple[IntArray, IntArray, int]:
-    """(count, properties) the unit at which the values start, and their number; the unit behind.
-
-    Raises:
-        InputError: the body ends before the element does, or a list has a negative length.
-    """
-    rows, end = _row_starts(body, at, count, properties)
-    starts = np.zeros((count, len(properties)), dtype=np.int64)
-    sizes = np.ones((count, len(properties)), dtype=np.int64)
-    for k, item in enumerate(properties):
-        if item.count_type is not None:
-            sizes[:, k] = body.values(rows, item.count_type)
-            rows = rows + body.width(item.count_type)
-        starts[:, k] = rows
-        rows = rows + sizes[:, k] * body.width(item.type)
-    return starts, sizes, end
-
-
-def _row_starts(
-    body: _Body, at: int, count: int, properties: list[_Property]
-) -> tuple[IntArray, int]:
-    """(count,) the unit at which each row of an element starts, and the unit behind the last."""
-    if count == 0 or not properties:
-        return np.full(count, at), at
-    if count > body.size - at:  # a row takes a unit at least
-        raise InputError("ends early, in a list")
-    stride = int(_row_ends(body, np.array([at]), properties)[0]) - at
-    even = at + stride * np.arange(count)
-    fits = 0 < stride <= (body.size - at) // count
-    if fits and (_row_ends(body, even, properties) == even + stride).all():
-        return even, at + stride * count
-    starts: list[int] = []
-    while len(starts) < count:
-        # The ends of the rows that would start at each of many units, true rows or not, take a
-        # few calls; then one look a row leads from each true row to the next.
-        begin, behind = at, min(at + BLOCK, body.size)
-        ends = _row_ends(body, np.arange(begin, behind), properties).tolist()
-        while at < behind and len(starts) < count:
-            starts.append(at)
-            at = ends[at - begin]
-            if at <= starts[-1]:
-                raise InputError("has a list of negative length")
-        if at > body.size or (at == body.size and len(starts) < count):
-            raise InputError("ends early, in a list")
-    return integers(starts), at
-
-
-def _row_ends(body: _Body, at: IntArray, properties: list[_Property]) -> IntArray:
-    """(n,) the units behind rows that start at these units (n,).
-
-    It is beyond the body if the row would be, and -1 if a list has a negative length.
-    """
-    beyond = body.size + 1
-    is_negative = np.zeros(len(at), dtype=bool)
-    for item in properties:
-        size: IntArray | int = 1
-        if item.count_type is not None:
-            width = body.width(item.count_type)
-            known = at + width <= body.size
-            counts = np.full(len(at), float(beyond))
-            counts[known] = np.fmin(body.values(at[known], item.count_type), beyond)
-            is_negative |= counts < 0
-            size = np.maximum(counts, 0).astype(np.int64)
-            at = at + width
-        at = np.minimum(at + size * body.width(item.type), beyond)
-    return np.where(is_negative, -1, at)
+    body: Body, at: int, count: int, properties: list[Property]
+) -> tuple[dict[str, List], int]:
+    """Lengths and values of an element's lists of LISTS, and the unit behind the element."""
+    if body.numbers is None and all(item.count_type is None for item in properties):
+        return {}, at + count * sum(item.type.itemsize for item in properties)
+    starts, sizes, end = walked(body, at, count, properties)
+    return {
+        item.name: (sizes[:, k], run_of_values(body, starts[:, k], sizes[:, k], item.type))
+        for k, item in enumerate(properties)
+        if item.count_type is not None and item.name in LISTS
+    }, end

@@ -10,7 +10,17 @@ import numpy.typing as npt
 
 from parapoint.files.content import ranges
 from parapoint.files.decoding import plain
-from parapoint.files.ply import INDICES, UV_COLUMNS, Column, Table, opened
+from parapoint.files.ply import (
+    INDICES,
+    POLYGONS,
+    UV_COLUMNS,
+    Column,
+    Table,
+    header_of,
+    opened,
+    ply,
+)
+from parapoint.files.point_writers import PLY_NAMES
 from parapoint.files.polygons import corner_rows
 from parapoint.files.targets import complete_file
 from parapoint.surfaces.parameterization import Parameterization
@@ -18,34 +28,28 @@ from parapoint.surfaces.surface import IntArray
 
 PICTURE = "TextureFile "
 """How the comment begins that names a picture, as MeshLab writes it."""
-NAMES = {
-    "i1": "char",
-    "u1": "uchar",
-    "i2": "short",
-    "u2": "ushort",
-    "i4": "int",
-    "u4": "uint",
-    "f4": "float",
-    "f8": "double",
-}
-"""PLY's name of each type."""
+NAMES = PLY_NAMES | {"i8": "int64", "u8": "uint64", "f2": "half"}
+"""PLY's name of each type, and the usual ones of types that it lacks."""
 FACE_UV = {"texcoord", "texnumber"}
 """Properties of faces that go with the old UVs."""
 
 
 def pictures_of(path: Path) -> tuple[list[str], IntArray]:
     """The pictures that a PLY file names, and (N,) the number of the one on each polygon."""
-    comments, tables = opened(plain(path.read_bytes()))
+    data = plain(path.read_bytes())
+    comments, tables = opened(data)
     names = [line.removeprefix(PICTURE).strip() for line in comments if line.startswith(PICTURE)]
-    faces = next(table for table in tables if table.name in {"face", "tristrips"})
-    if "texnumber" in faces.columns:
-        return names, faces.columns["texnumber"].values.astype(np.int64)
-    return names, np.zeros(faces.count, dtype=np.int64)
+    first, *others = (table for table in tables if table.name in POLYGONS and table.count)
+    if not others and "texnumber" in first.columns:
+        return names, first.columns["texnumber"].values.astype(np.int64)
+    return names, np.zeros(len(ply(data).sizes), dtype=np.int64)
 
 
-def has_strips(path: Path) -> bool:
-    """Whether a PLY file holds triangle strips, not faces."""
-    return b"element face" not in plain(path.read_bytes()).partition(b"end_header")[0]
+def is_rewritable(path: Path) -> bool:
+    """Whether all polygons of a PLY file are rows of one element "face"."""
+    header = header_of(plain(path.read_bytes()))
+    elements = header[1] if header is not None else []
+    return [name for name, count, _ in elements if name in POLYGONS and count] == ["face"]
 
 
 def rewrite_ply(
@@ -73,7 +77,7 @@ def rewrite_ply(
         The number of polygons that became triangles.
     """
     comments, tables = opened(plain(source.read_bytes()))
-    by_name = {table.name: table for table in tables}
+    by_name = {table.name: table for table in tables if table.name not in POLYGONS or table.count}
     faces = by_name["face"]
     indices = next(name for name in faces.columns if name in INDICES)
     corners, sizes = faces.columns[indices].values.astype(np.int64), faces.columns[indices].sizes

@@ -33,7 +33,8 @@ def write_points(path: str | Path, cloud: PointCloud, uv: FloatArray) -> None:
     """Write points and their UV: .ply (properties u and v), .npz (points, uv) or .obj (v, vt).
 
     Normals and attributes are carried where the cloud has them; OBJ has room for colours alone,
-    as fractions behind each position.
+    as fractions behind each position. Where rows of the file were left out, `file_row` says which
+    row, from 0, each point was.
 
     Raises:
         InputError: another ending; `uv` is not (P, 2), each row finite or of two NaN.
@@ -60,10 +61,16 @@ def write_points(path: str | Path, cloud: PointCloud, uv: FloatArray) -> None:
 
 def _npz(file: IO[bytes], cloud: PointCloud, uv: FloatArray) -> None:
     """Arrays `points`, `normals`, `uv`, and each attribute by its name."""
-    arrays: dict[str, Any] = {**cloud.attributes, "points": cloud.points, "uv": uv}
+    arrays: dict[str, Any] = {**_known(cloud), "points": cloud.points, "uv": uv}
     if cloud.normals is not None:
         arrays["normals"] = cloud.normals
     np.savez_compressed(file, **arrays)
+
+
+def _known(cloud: PointCloud) -> dict[str, npt.NDArray[Any]]:
+    """The attributes of the points, and the rows that they come from where some were left out."""
+    rows = {} if cloud.rows is None else {"file_row": cloud.rows.astype(np.uint32)}
+    return {**cloud.attributes, **rows}
 
 
 def ply_columns(cloud: PointCloud) -> dict[str, npt.NDArray[Any]]:
@@ -71,7 +78,7 @@ def ply_columns(cloud: PointCloud) -> dict[str, npt.NDArray[Any]]:
     columns = dict(zip("xyz", cloud.points.T, strict=True))
     if cloud.normals is not None:
         columns |= dict(zip(("nx", "ny", "nz"), cloud.normals.T, strict=True))
-    for name, values in cloud.attributes.items():
+    for name, values in _known(cloud).items():
         if name == "colours":
             columns |= dict(zip(COLOUR_COLUMNS[0], values.T, strict=False))
         elif values.ndim == 1:

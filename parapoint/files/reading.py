@@ -22,7 +22,7 @@ import numpy.typing as npt
 from parapoint.errors import InputError
 from parapoint.files.content import NO_UV, Content
 from parapoint.files.decoding import plain
-from parapoint.files.gltf import glb, gltf
+from parapoint.files.gltf import gltf
 from parapoint.files.las import las
 from parapoint.files.npz import npz
 from parapoint.files.obj import obj
@@ -48,7 +48,7 @@ FORMATS: dict[str, Callable[[bytes, Path], Content]] = {
     ".ply": lambda data, _: ply(data),
     ".off": lambda data, _: off(data),
     ".stl": lambda data, _: stl(data),
-    ".glb": glb,
+    ".glb": gltf,
     ".gltf": gltf,
     ".xyz": lambda data, _: xyz(data),
     ".pts": lambda data, _: pts(data),
@@ -366,4 +366,7 @@ def _point_cloud(content: Content, path: Path) -> PointCloud:
         logger.warning("%s: normals left out: some are not finite", path)
         normals = None
     attributes = {name: values[finite] for name, values in content.attributes.items()}
-    return PointCloud(content.vertices[finite], normals, int((~finite).sum()), attributes)
+    rows = content.rows
+    if not finite.all():
+        rows = np.flatnonzero(finite) if rows is None else rows[finite]
+    return PointCloud(content.vertices[finite], normals, int((~finite).sum()), attributes, rows)

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import logging
 import re
-from typing import Any
+from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
-import numpy.typing as npt
 
 from parapoint.errors import InputError
-from parapoint.files.attributes import colours_of
+from parapoint.files.columns import UNEVEN, are_atoms, columns_of, is_number
 from parapoint.files.content import Content, plain_numbers, points_content
+from parapoint.files.headings import Heading, heading_of
 from parapoint.surfaces.surface import FloatArray
 
 logger = logging.getLogger("parapoint")
 
 LOOKED_AT = 20_000
-"""Lines, spread over the file, by which the meaning of its commas is told."""
+"""Lines, spread over the file, by which the meaning of its commas and columns is told."""
 DECIMAL_COMMA = re.compile(rb"[+-]?\d*,\d+(?:[eE][+-]?\d+)?$|[+-]?\d+$")
 """A word with one comma at most, as it is written where the comma marks decimals."""
 GROUPED = re.compile(rb"[+-]?\d{1,3}(?:,\d{3})+\.\d*$")
@@ -26,19 +27,36 @@ GROUPED_WHOLE = re.compile(rb"[+-]?\d{1,3}(?:,\d{3})+$")
 """The same without a fraction; beside others that have one."""
 GROUPED_BY_POINTS = re.compile(rb"[+-]?\d{1,3}(?:\.\d{3})+,\d*$")
 """The same as it is written where the comma marks decimals; 1.234,5."""
+GROUPED_BY_BLANKS = re.compile(rb"[+-]?\d{1,3}(?: \d{3})+(?:[.,]\d*)?")
+"""The same with blanks; 1 234,5."""
 
-AXES = {
-    **dict.fromkeys(("easting", "east"), "x"),
-    **dict.fromkeys(("northing", "north"), "y"),
-    **dict.fromkeys(("elevation", "height", "altitude"), "z"),
+COMMENTS = (b"#", b"//", b"%")
+"""What begins a comment."""
+SPELLED = {
+    "\N{MINUS SIGN}".encode(): b"-",
+    "\N{NO-BREAK SPACE}".encode(): b" ",
+    "\N{NARROW NO-BREAK SPACE}".encode(): b" ",
+    "\N{THIN SPACE}".encode(): b" ",
 }
-"""What surveyors write over the columns of x, y and z."""
+"""Signs that word processors write, and the plain ones that they stand for."""
+QUOTED = re.compile(
+    rb'(?:^|(?<=[\s,;|]))"([^"\n]*[^"\n\d+\-.,eE][^"\n]*)"(?=[\s,;|]|$)', re.MULTILINE
+)
+"""What stands between quotation marks and is no number."""
+PLACE = re.compile(rb"p\s+[-+.\d]")
+"""What begins a line of a point in a PTS file of Hoppe's."""
+CELLS = re.compile(rb'[\s,;|"]+')
+"""What parts words in a line of which nothing is known yet."""
 
 
-def table(lines: list[bytes], columns: tuple[int, ...]) -> FloatArray:
-    """(n, len(columns)) numbers in these columns of text lines; empty for no lines."""
+def table(lines: list[bytes], columns: Sequence[int] | None) -> FloatArray:
+    """(n, len(columns)) numbers in these columns of text lines, None for all; empty for no lines.
+
+    Raises:
+        ValueError: a line has too few words, or one that is no number.
+    """
     if not lines:
-        return np.zeros((0, len(columns)))
+        return np.zeros((0, len(columns or ())))
     text = (line.decode("latin-1") for line in lines)  # no second copy of millions of lines
     return np.loadtxt(text, comments="#", usecols=columns, ndmin=2, dtype=np.float64)
 
@@ -47,40 +65,145 @@ def text_lines(data: bytes) -> list[bytes]:
     """Lines that hold more than blanks and comments, with points for decimals, blanks between.
 
     Raises:
-        InputError: commas part numbers or mark decimals, and it cannot be told which.
+        InputError: as for `_blank_parted`.
+    """
+    return _blank_parted(_kept(_all_lines(data)))[0]
+
+
+def _all_lines(data: bytes) -> list[bytes]:
+    """The lines of a text, with signs and numbers spelled as most programs spell them.
+
+    Raises:
+        InputError: a space that is not plain stands between digits.
     """
     data = plain_numbers(data)
-    lines = [
+    for sign, plain in SPELLED.items():
+        if sign in data:
+            if plain == b" " and re.search(rb"\d" + sign + rb"\d", data):
+                raise InputError(
+                    "has no-break spaces between digits, which may group them or part two numbers; "
+                    "write plain blanks between the numbers, and none inside them"
+                )
+            data = data.replace(sign, plain)
+    return data.splitlines()
+
+
+def _kept(lines: list[bytes]) -> list[bytes]:
+    """The lines that hold more than blanks and comments."""
+    return [line for line in lines if (bare := line.strip()) and not bare.startswith(COMMENTS)]
+
+
+def _rows(lines: list[bytes]) -> list[bytes]:
+    """The same without the counts of points before each scan."""
+    return [
         line
-        for line in data.translate(None, b'"').replace(b";", b" ").splitlines()
-        if line.strip() and not line.lstrip().startswith((b"#", b"//"))
+        for line in lines
+        if (bare := line.strip()) and not (bare.isdigit() or bare.startswith(COMMENTS))
     ]
-    if b"," not in data:
-        return lines
+
+
+def _blank_parted(lines: list[bytes], names: int = 0) -> tuple[list[bytes], bool]:
+    """The lines with blanks between their cells, points for decimals, and nan for an empty cell.
+
+    Args:
+        lines: rows of one table.
+        names: how many names its heading has.
+
+    Returns:
+        The lines, and whether their cells were parted by more than blanks, so that none is missing.
+
+    Raises:
+        InputError: commas part numbers or mark decimals, and it cannot be told which.
+    """
+    text = b"\n".join(lines)
+    if b'"' in text:
+        text = QUOTED.sub(lambda found: re.sub(rb"[\s,;|]", b"_", found[1]), text)
+        text = text.translate(None, b'"')
+        lines = text.split(b"\n")
+    if not any(mark in text for mark in (b",", b";", b"|", b"\t")):
+        return lines, False
     looked_at = [line for line in lines[:: len(lines) // LOOKED_AT + 1] if re.search(rb"\d", line)]
-    # A comma with a blank behind it parts numbers, whatever those inside words do.
-    words = [re.sub(rb",(?=\s|$)", b" ", line).split() for line in looked_at]
-    with_comma = [word for line in words for word in line if b"," in word]
-    if with_comma and _marks_decimals(words, with_comma):
-        points = any(GROUPED_BY_POINTS.match(word) for word in with_comma)
-        spaced = (re.sub(rb",(?=\s|$)", b" ", line) for line in lines)
-        if points:
-            spaced = (line.replace(b".", b"") for line in spaced)
-        return [line.replace(b",", b".") for line in spaced]
-    grouped = any(GROUPED.match(word) for word in with_comma) and all(
-        GROUPED.match(word) or GROUPED_WHOLE.match(word) for word in with_comma
-    )
-    if grouped and min(map(len, words)) >= 3:
-        return [re.sub(rb",(?=\d)", b"", line).replace(b",", b" ") for line in lines]
-    return [line.replace(b",", b" ") for line in lines]
+    mark = next((mark for mark in (b";", b"|") if mark in text), b"")
+    if b"," in text:
+        # A comma with a blank behind it parts numbers, whatever those inside words do.
+        words = [re.sub(rb",(?=\s|$)|[;|]", b" ", line).split() for line in looked_at]
+        with_comma = [word for line in words for word in line if b"," in word]
+        grouped = any(GROUPED.match(word) for word in with_comma) and all(
+            GROUPED.match(word) or GROUPED_WHOLE.match(word) for word in with_comma
+        )
+        if with_comma and _marks_decimals(words, with_comma, names):
+            text = re.sub(rb",(?=\s|$)", b" ", text)
+            if any(GROUPED_BY_POINTS.match(word) for word in with_comma):
+                text = text.replace(b".", b"")
+            text = text.replace(b",", b".")
+        elif grouped and min(map(len, words)) >= 3:
+            text = re.sub(rb",(?=\d)", b"", text).replace(b",", b" ")
+        elif mark:
+            text = text.replace(b",", b" ")
+        else:
+            mark = b","
+    if not mark and b"\t" in text and _parts_cells(looked_at, names):
+        mark = b"\t"
+    if not mark:
+        return text.split(b"\n"), False
+    return _filled(text, mark, looked_at)
 
 
-def _marks_decimals(words: list[list[bytes]], with_comma: list[bytes]) -> bool:
+def _parts_cells(lines: list[bytes], names: int) -> bool:
+    """Whether tabs part cells, some of which may be empty, and do not only align them."""
+    cells = [line.split(b"\t") for line in lines]
+    if len(set(map(len, cells))) != 1:
+        return False
+    empty = {tuple(k for k, cell in enumerate(line) if not cell.strip()) for line in cells}
+    return len(empty) > 1 or empty == {()} or len(cells[0]) == names
+
+
+def _filled(text: bytes, mark: bytes, looked_at: list[bytes]) -> tuple[list[bytes], bool]:
+    """Lines whose cells a mark parts, with blanks in its place and nan in empty cells.
+
+    Args:
+        text: of the lines, with points for decimals.
+        mark: what parts the cells.
+        looked_at: some lines.
+
+    Returns:
+        As for `_blank_parted`.
+    """
+    runs = [
+        cell.strip()
+        for line in looked_at
+        if b" " in line or b"\t" in line
+        for cell in line.split(mark)
+        if len(words := cell.split()) > 1
+        and all(is_number(word.replace(b",", b".")) for word in words)
+    ]
+    if runs and mark != b"," and all(map(GROUPED_BY_BLANKS.fullmatch, runs)):
+        raise InputError(f"has blanks inside numbers ({runs[0].decode()}); write none there")
+    is_exact = not runs
+    if mark != b"\t":
+        text = text.replace(b"\t", b" ")
+    text = b"\n" + text + b"\n"
+    for bare, spaced in product((mark, b"\n"), (b" %b", b"%b ")):
+        while spaced % bare in text:
+            text = text.replace(spaced % bare, bare)
+    if is_exact:
+        text = text.replace(b" ", b"_")  # several words in one cell
+    for empty, filled in (
+        *((mark + mark, mark + b"nan" + mark),) * 2,  # twice, for runs of them
+        (b"\n" + mark, b"\nnan" + mark),
+        (mark + b"\n", mark + b"nan\n"),
+    ):
+        text = text.replace(empty, filled)
+    return text[1:-1].replace(mark, b" ").split(b"\n"), is_exact
+
+
+def _marks_decimals(words: list[list[bytes]], with_comma: list[bytes], names: int) -> bool:
     """Whether the commas inside words mark decimals.
 
     Args:
         words: of each line.
         with_comma: those that hold a comma.
+        names: how many names the heading has.
     """
     fewest = min(map(len, words))
     if fewest >= 3:
@@ -94,6 +217,8 @@ def _marks_decimals(words: list[list[bytes]], with_comma: list[bytes]) -> bool:
         map(len, parts)
     ):
         return False  # other lines have as many numbers, parted by blanks
+    if {names} == set(map(len, parts)):
+        return False
     is_whole = all(part.lstrip(b"+-").isdigit() for word in parts for part in word)
     signed = any(part.startswith((b"+", b"-")) for word in parts for part in word[1::2])
     if is_whole and not signed and (fewest > 1 or max(map(len, parts)) >= 6):
@@ -102,28 +227,6 @@ def _marks_decimals(words: list[list[bytes]], with_comma: list[bytes]) -> bool:
             "write decimals with points, and blanks between the numbers"
         )
     return False
-
-
-def point_lines(data: bytes) -> tuple[list[bytes], list[str]]:
-    """Lines with numbers, and the names of their columns, [] where none are given.
-
-    Left out are a heading, a line of units below it, and the counts before each scan.
-
-    Raises:
-        InputError: there is no point, or it is PTX; see `text_lines`.
-    """
-    lines = text_lines(data)
-    _refuse_ptx(lines)
-    lines = [line for line in lines if not line.strip().isdigit()]
-    comment = data.lstrip().split(b"\n", 1)[0]
-    heading = comment if comment.startswith((b"#", b"//")) else b""
-    for _ in range(2):
-        if lines and not any(map(_is_number, lines[0].split())):
-            heading = heading if _names(heading) else lines[0]
-            lines = lines[1:]
-    if not lines:
-        raise InputError("has no point")
-    return lines, _names(heading)
 
 
 def _refuse_ptx(lines: list[bytes]) -> None:
@@ -135,100 +238,114 @@ def _refuse_ptx(lines: list[bytes]) -> None:
         raise InputError("is PTX, whose scans have places of their own; export it as PTS or PLY")
 
 
-def _is_number(word: bytes) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
-
-
-def _names(heading: bytes) -> list[str]:
-    """The names of columns in a line that has x, y and z among them; [] of any other line.
-
-    Units in brackets are left out; what surveyors call the axes is x, y and z.
-    """
-    text = re.sub(r"[\[(][^\])]*[\])]", "", heading.decode("latin-1").lower())
-    words = re.findall(r"[^\s,;\"]+", text.lstrip("#/ \t"))
-    names = [AXES.get(word, word) for word in words]
-    return names if {"x", "y", "z"} <= set(names) else []
-
-
 def xyz(data: bytes) -> Content:
-    """Text with x y z in each line, and whatever columns a scanner adds; see `_further_columns`."""
-    lines, names = point_lines(data)
+    """Text with x y z in each line, and whatever columns a scanner adds; see `_further_columns`.
+
+    Raises:
+        InputError: there is no point, it cannot be told which columns are x, y and z, one of them
+            is no number in some line, or it is PTX; see `_all_lines` and `_blank_parted`.
+    """
+    return _cloud(_all_lines(data))
+
+
+def _cloud(lines: list[bytes]) -> Content:
+    """The points in the lines of a text."""
+    _refuse_ptx(lines)
+    start, headings = _head(lines)
+    kept = _rows(lines[start:])
+    if not kept:
+        raise InputError("has no point: none of its lines holds three numbers")
+    names = max((len(heading.names) for heading in headings if heading.axes), default=0)
+    rows, is_exact = _blank_parted(kept, names)
+    step = len(rows) // LOOKED_AT + 1
+    sample = [_words(row) for row in rows[::step]]
+    if min(map(len, sample)) < 3:
+        raise InputError(_fault(lines, start, rows, [0, 1, 2]))
+    if are_atoms(lines[:start], len(rows), sample):
+        logger.warning("the first column holds atomic numbers: the coordinates are behind it")
+        return points_content(table(rows, (1, 2, 3)))
+    columns = columns_of(headings, sample, step, is_exact)
+    read = columns.axes + columns.others
     try:
-        values = table(lines, tuple(range(len(lines[0].split()))))
-    except ValueError:  # words, or not in all lines: the coordinates alone
-        values = table(lines, (0, 1, 2))
-    if values.shape[1] < 3:
-        raise InputError("has fewer than three numbers in a line")
-    values = values[:, _coordinates_first(names, values)]
-    return points_content(values[:, :3], *_further_columns(values))
+        values = table(rows, None)[:, read] if columns.is_whole else table(rows, read)
+    except ValueError as error:
+        if "number of columns" in str(error) and not columns.may_vary:
+            raise InputError(UNEVEN) from error
+        # Words, or not in all lines: the coordinates alone.
+        columns = columns._replace(others=[], names=[])
+        try:
+            values = table(rows, columns.axes)
+        except ValueError:
+            raise InputError(_fault(lines, start, rows, columns.axes)) from error
+    return columns.content(values)
 
 
-def _coordinates_first(names: list[str], values: FloatArray) -> list[int]:
-    """The columns in the order x, y, z and others, by their names if all have one.
+def _head(lines: list[bytes]) -> tuple[int, list[Heading]]:
+    """The place of the first row, and what the lines before it say about the columns.
 
-    Without names a first column that numbers the rows is left out, and a warning says so.
+    Before it are comments, the count of the points, a title, the names of columns, their units.
     """
-    columns = list(range(values.shape[1]))
-    if len(names) == len(columns):
-        at = [names.index(name) for name in "xyz"]
-        return at + [column for column in columns if column not in at]
-    number = values[:, 0]
-    if len(columns) > 3 and len(number) > 2 and number[0] in {0, 1}:
-        others_are_whole = (values[:, 1:4] == np.floor(values[:, 1:4])).all()
-        if (np.diff(number) == 1).all() and not others_are_whole:
-            logger.warning("the first column numbers the rows: the coordinates are behind it")
-            return columns[1:]
-    return columns
+    headings: list[Heading] = []
+    for at, line in enumerate(lines):
+        if not line.strip() or line.strip().isdigit():
+            continue
+        heading = heading_of(line)
+        is_named = any(before.axes for before in headings)
+        words = [word for word in CELLS.split(line) if word]
+        count = sum(map(is_number, words))
+        if not (heading.is_comment or heading.axes) and (
+            count >= 3 or 0 < count == len(words) or (is_named and count > 0)
+        ):
+            return at, headings
+        headings.append(heading)
+    return len(lines), headings
 
 
-def _further_columns(
-    values: FloatArray,
-) -> tuple[FloatArray | None, dict[str, npt.NDArray[Any]]]:
-    """Normals, or None, and attributes in the columns behind x y z of (P, 3 + k) numbers.
+def _words(row: bytes) -> list[bytes]:
+    """The words of a row, without a comment behind them."""
+    return row.split(b"#", 1)[0].split()
 
-    Three columns together are normals where all have length 1, and colours where all are whole
-    numbers from 0 to 255 or fractions from 0 to 1. Single columns come before them, as in PTS: the
-    first is the intensity.
+
+def _fault(lines: list[bytes], start: int, rows: list[bytes], axes: list[int]) -> str:
+    """What is wrong with the first row in which a coordinate is no number.
+
+    Args:
+        lines: of the file.
+        start: the place of the first row among them.
+        rows: the rows.
+        axes: the columns of x, y and z.
     """
-    finite = np.isfinite(values).all(axis=1)
-    normals: FloatArray | None = None
-    attributes: dict[str, npt.NDArray[Any]] = {}
-    columns = values.shape[1]
-    single = (columns - 3) % 3
-    for at in range(3, 3 + single):
-        attributes["intensity" if at == 3 else f"column{at + 1}"] = values[:, at]
-    for at in range(3 + single, columns, 3):
-        three = values[:, at : at + 3]
-        length = np.linalg.norm(np.clip(three[finite], -2, 2), axis=1)  # clipped: no overflow
-        colours = colours_of(three)
-        if normals is None and len(length) and (np.abs(length - 1) < 1e-3).all():
-            normals = three
-        elif "colours" not in attributes and colours is not None and colours.dtype != np.uint16:
-            attributes["colours"] = colours
-        else:
-            attributes |= {f"column{at + k + 1}": three[:, k] for k in range(3)}
-    return normals, attributes
+    numbers = [at for at, line in enumerate(lines[start:], start + 1) if _rows([line])]
+    for number, words in zip(numbers, map(_words, rows), strict=True):
+        if len(words) <= max(axes):
+            return f"has only {len(words)} columns in line {number}; x, y or z is missing"
+        for axis, column in zip("xyz", axes, strict=True):
+            if not is_number(words[column]):
+                word = words[column].decode("utf-8", "replace")[:30]
+                return (
+                    f"has {word!r} in line {number}, column {column + 1}, where {axis} should be a "
+                    "number; if the columns are in another order, name them in a first line"
+                )
+    return "has numbers that cannot be read"
 
 
 def pts(data: bytes) -> Content:
     """PTS: lines "p x y z" (Hoppe), or of each scan a count, x y z and what a scanner adds.
 
     Raises:
-        InputError: a scan has fewer points than its count announces; see `xyz`.
+        InputError: a scan has fewer points than its count announces, or more; see `xyz`.
     """
-    lines = text_lines(data)
-    marked = [line for line in lines if line.startswith(b"p ")]
+    lines = _all_lines(data)
+    marked = [line for line in lines if PLACE.match(line)]
     if marked:
-        return points_content(table(marked, (1, 2, 3)))
-    _refuse_ptx(lines)
-    counts = [at for at, line in enumerate(lines) if line.strip().isdigit()]
-    if counts[:1] == [0]:
-        for at, after in zip(counts, [*counts[1:], len(lines)], strict=True):
-            announced, found = int(lines[at]), after - at - 1
-            if found < announced:
-                raise InputError(f"ends early: {announced} points are announced, {found} are there")
-    return xyz(data)
+        return points_content(table(_blank_parted(marked)[0], (1, 2, 3)))
+    kept = _kept(lines)
+    counts = [at for at, line in enumerate(kept) if line.strip().isdigit()]
+    if counts and counts[0] < _head(kept)[0]:
+        for at, after in zip(counts, [*counts[1:], len(kept)], strict=True):
+            announced = int(kept[at])
+            found = after - at - 1 - _head(kept[at + 1 : min(after, at + 9)])[0]
+            if found != announced:
+                early = "ends early: " if found < announced else ""
+                raise InputError(f"{early}{announced} points are announced, {found} are there")
+    return _cloud(lines)

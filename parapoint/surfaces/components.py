@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from parapoint.surfaces.preparation import welded
 from parapoint.surfaces.scan_lines import breadth
-from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh, PointCloud, Surface
+from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh, Surface
 
 COMPONENTS = ("together", "each", "largest")
 """What the parameter `components` of a fit may say: one map of the whole surface, one of each
@@ -63,7 +63,7 @@ def components(surface: Surface) -> list[Surface]:
         return [_submesh(surface, label == k) for k in order] or [surface]
     label = cloud_labels(surface.points)
     by_size = np.argsort(-np.bincount(label), kind="stable")
-    return [_subcloud(surface, label == k) for k in by_size]
+    return [surface.chosen(label == k) for k in by_size]
 
 
 def largest_component(mesh: Mesh) -> tuple[Mesh, BoolArray]:
@@ -92,13 +92,6 @@ def cloud_labels(points: FloatArray) -> IntArray:
         return np.zeros(len(points), dtype=np.int64)
     nearest = cKDTree(sample[large]).query(points)[1]
     return np.unique(label[large][nearest], return_inverse=True)[1].astype(np.int64)
-
-
-def _subcloud(cloud: PointCloud, chosen: BoolArray) -> PointCloud:
-    """These points (N,) with all that is known of them."""
-    normals = None if cloud.normals is None else cloud.normals[chosen]
-    attributes = {name: values[chosen] for name, values in cloud.attributes.items()}
-    return PointCloud(cloud.points[chosen], normals, attributes=attributes)
 
 
 def _submesh(mesh: Mesh, chosen: np.ndarray) -> Mesh:

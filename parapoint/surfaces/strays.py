@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from parapoint.errors import InputError
 from parapoint.surfaces.frame import Frame
+from parapoint.surfaces.scan_lines import breadth
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh, PointCloud, Surface
 
 APART = 30.0
@@ -38,6 +39,16 @@ MOST_SHAPELESS = 0.5
 """If a larger share of the places is in stray groups of either kind, none of it is left out."""
 LOOSE = 5.0
 """Distance to the neighbour of rank NEAREST at which a point is loose, in typical spacings."""
+ALONE = 3.5
+"""A single place is stray if its distance to the nearest other is more than this times the distance
+to the neighbour of rank NEAREST, both at each of the SURROUNDING nearest places and at the share
+CLOSE of all places. The largest such ratio is 1.3 among the vertices or points of 67 models. Of
+1,147 parts of these, some a hundred times sparser on one side, two lose a point each."""
+SURROUNDING, CLOSE = 128, 0.98
+ON_LINES = 1_000
+"""Nearest places that tell whether a single place lies beside lines of a scan, where it stays."""
+MIXED = (73_856_093, 19_349_663, 83_492_791)
+"""Primes that make one number of the three of a cell."""
 AROUND = 16
 """Points whose spread tells how thick a group is."""
 THICK, THIN = 2.0, 0.2
@@ -94,32 +105,30 @@ def _finite(given: npt.ArrayLike) -> PointCloud:
     dropped = int((~finite).sum())
     if dropped:
         logger.warning("dropped %d of %d points: not finite", dropped, len(points))
-    return PointCloud(points[finite], dropped=dropped)
+    rows = np.flatnonzero(finite) if dropped else None
+    return PointCloud(points[finite], dropped=dropped, rows=rows)
 
 
 def without_strays(surface: Surface) -> tuple[Surface, dict[str, object]]:
     """The surface without the stray points of a cloud; their number and first rows, as facts.
 
-    A warning names them. Rows are numbered from 0.
+    A warning names their rows, numbered from 0, of the file or array that was given.
     """
     if isinstance(surface, Mesh):
         return surface, {}
     is_stray = stray_points(surface.points)
-    rows = np.flatnonzero(is_stray)
+    rows = surface.rows_of(np.flatnonzero(is_stray))
     if len(rows) == 0:
         return surface, {"strays": 0}
     logger.warning(
         "%d of %d points lie far from all others and are mapped nowhere: row%s %s",
         len(rows),
-        len(is_stray),
+        len(surface.points),
         "s" * (len(rows) > 1),
         named(rows),
     )
-    kept = ~is_stray
-    normals = None if surface.normals is None else surface.normals[kept]
-    attributes = {name: values[kept] for name, values in surface.attributes.items()}
-    cloud = PointCloud(surface.points[kept], normals, surface.dropped, attributes)
-    return cloud, {"strays": len(rows), "stray_rows": rows[:NAMED].tolist()}
+    facts = {"strays": len(rows), "stray_rows": rows[:NAMED].tolist()}
+    return surface.chosen(~is_stray), facts
 
 
 def named(rows: IntArray) -> str:
@@ -166,7 +175,9 @@ def stray_points(points: FloatArray) -> BoolArray:
     if len(places) <= NEAREST + 1:
         return np.zeros(len(points), dtype=bool)
     looked_at = places[:: len(places) // SAMPLED + 1]
-    spacing = float(np.median(cKDTree(places).query(looked_at, NEAREST + 1)[0][:, -1]))
+    tree = cKDTree(places)
+    spacings = tree.query(looked_at, [NEAREST + 1])[0][:, 0]
+    spacing = float(np.median(spacings))
     cells, cell = np.unique(
         np.floor(places / (APART * spacing)).astype(np.int64), axis=0, return_inverse=True
     )
@@ -190,7 +201,36 @@ def stray_points(points: FloatArray) -> BoolArray:
         is_stray[:] = False
     if (is_stray | shapeless)[group].mean() <= MOST_SHAPELESS:
         is_stray |= shapeless
-    return np.asarray(is_stray[group][place.reshape(-1)])
+    stray_places = is_stray[group]
+    stray_places[_alone(tree, float(np.quantile(spacings, CLOSE)), most=int(few))] = True
+    return np.asarray(stray_places[place.reshape(-1)])
+
+
+def _alone(tree: cKDTree, spacing: float, most: int) -> IntArray:
+    """Rows of the single places that are far from all others; none if there are more than `most`.
+
+    Args:
+        tree: the places.
+        spacing: distance to the neighbour of rank NEAREST that the share CLOSE of them has at most.
+        most: so many may be alone; if there are more, they are how the cloud is sampled.
+    """
+    reach = ALONE * spacing
+    places = np.asarray(tree.data)
+    # A cell so small holds no other place than one that is alone; its number may serve others too.
+    cell = np.floor(places / (reach / 2)).astype(np.int64) @ np.array(MIXED)
+    _, number, count = np.unique(cell, return_inverse=True, return_counts=True)
+    lone: IntArray = np.flatnonzero(count[number] == 1)
+    lone = lone[np.isinf(tree.query(places[lone], [2], distance_upper_bound=reach)[0][:, 0])]
+    if len(lone) > most:
+        return lone[:0]
+    found = []
+    for row in lone:
+        distance, near = tree.query(places[row], min(ON_LINES, len(places)))
+        around = places[near[1 : SURROUNDING + 1]]
+        local = float(tree.query(around, [NEAREST + 1])[0].max())
+        if distance[1] > ALONE * local and breadth(places[near[1:]]) is None:
+            found.append(row)
+    return np.array(found, dtype=np.int64)
 
 
 def _is_loose(places: FloatArray, some: FloatArray, spacing: float) -> bool:

@@ -277,6 +277,8 @@ class PointCloud:
         attributes: whatever else is known at each point, by name: (P,) or (P, k) numbers of any
             type. "colours" are (P, 3) or (P, 4) sRGB values, uint8, uint16, or floats from 0 to 1;
             "intensity" is (P,).
+        rows: (P,) row of each point, from 0, in the file or array that the cloud comes from; None
+            where all rows of that are there.
 
     Raises:
         InputError: a shape or a value is not as said.
@@ -286,6 +288,7 @@ class PointCloud:
     normals: FloatArray | None = None
     dropped: int = 0
     attributes: Mapping[str, npt.NDArray[Any]] = field(default_factory=dict)
+    rows: IntArray | None = None
 
     def __post_init__(self) -> None:
         points = read_only(self.points, np.float64, "points", 3)
@@ -299,6 +302,19 @@ class PointCloud:
             object.__setattr__(self, "normals", normals)
         given = {name: _attribute(name, of, len(points)) for name, of in self.attributes.items()}
         object.__setattr__(self, "attributes", MappingProxyType(given))
+        if self.rows is not None and self.rows.shape != (len(points),):
+            raise InputError(f"{len(self.rows)} row numbers for {len(points)} points")
+
+    def chosen(self, which: BoolArray) -> PointCloud:
+        """Some of the points (P,), with all that is known of them."""
+        normals = None if self.normals is None else self.normals[which]
+        attributes = {name: values[which] for name, values in self.attributes.items()}
+        rows = self.rows_of(np.flatnonzero(which))
+        return PointCloud(self.points[which], normals, self.dropped, attributes, rows)
+
+    def rows_of(self, places: IntArray) -> IntArray:
+        """The rows, in the file or array that was given, of the points at these places (n,)."""
+        return places if self.rows is None else self.rows[places]
 
 
 def _attribute(name: str, values: Any, count: int) -> npt.NDArray[Any]:

@@ -9,12 +9,13 @@ import igl
 import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
+from scipy.spatial import cKDTree
 
 from parapoint.errors import InputError
 from parapoint.files.attributes import unit_colours
 from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.parameterization import Charted
-from parapoint.surfaces.surface import FloatArray, PointCloud
+from parapoint.surfaces.surface import FloatArray, Mesh, PointCloud, Surface
 from parapoint.textures.scattered import Scattered
 from parapoint.textures.tangents import in_tangent_space
 from parapoint.textures.texels import Texels, texels
@@ -31,8 +32,7 @@ BATCH = 262_144
 """Texels that are painted at a time, which bounds the memory to some 100 MB."""
 
 APART = 0.05
-"""Median distance of a cloud from a mesh, in diagonals of the mesh, beyond which they are not of
-one surface, or not in one place."""
+"""Distance from a mesh, in diagonals of the mesh, beyond which a point does not lie on it."""
 COMPARED = 1000
 """Points whose distance is looked at."""
 
@@ -97,22 +97,34 @@ def check_in_square(charted: Charted) -> None:
         raise InputError("its UVs have no area where its faces do, so no texture can show it")
 
 
-def check_together(charted: Charted, cloud: PointCloud) -> None:
-    """Check that a cloud lies on a mesh.
+def check_together(
+    charted: Charted, surface: Surface, known: FloatArray | None = None, least: float = 0.5
+) -> float:
+    """Check that a share of a surface lies on the mesh of a model; the share that does.
+
+    Args:
+        charted: the mesh.
+        surface: a cloud, or a mesh, whose vertices are looked at.
+        known: (n, 3) further points of the model, or None.
+        least: the share, from 0 (some point) to below 1.
 
     Raises:
         InputError: it does not.
     """
     mesh = charted.mesh
-    some = cloud.points[:: max(1, len(cloud.points) // COMPARED)]
-    squared = igl.point_mesh_squared_distance(some, mesh.vertices, mesh.faces)[0]
-    apart = float(np.sqrt(np.median(squared)))
+    points = surface.vertices[surface.referenced] if isinstance(surface, Mesh) else surface.points
+    some = points[:: max(1, len(points) // COMPARED)]
+    apart = np.sqrt(igl.point_mesh_squared_distance(some, mesh.vertices, mesh.faces)[0])
+    if known is not None:
+        apart = np.minimum(apart, cKDTree(known).query(some)[0])
     diagonal = float(np.linalg.norm(np.ptp(mesh.vertices[mesh.referenced], axis=0)))
-    if apart > APART * diagonal:
+    nearest = float(np.sort(apart)[int(least * len(apart))])
+    if nearest > APART * diagonal:
         raise InputError(
-            f"does not lie on the surface of the model: half of its points are {apart:.3g} or more "
-            f"from it, which is {diagonal:.3g} across"
+            f"does not lie on the surface of the model: {'half' if least else 'all'} of its points "
+            f"are {nearest:.3g} or more from it, which is {diagonal:.3g} across"
         )
+    return float((apart <= APART * diagonal).mean())
 
 
 Done = Callable[[float], None]

@@ -47,14 +47,14 @@ def thinned(
     kept: list[PointCloud] = []
     taken: IntArray = np.zeros(0, dtype=np.int64)
     kinds: set[np.dtype[Any]] = set()
-    count, has_colour = 0, kind != "colour"
+    count, has_shown = 0, kind not in SHOWN
     for piece in pieces:
         check_bakeable(piece, kind)
         count += len(piece.points)
         if kind in SHOWN:
             values = piece.attributes[SHOWN[kind]]
             kinds.add(values.dtype)
-            has_colour |= bool(values.any())
+            has_shown |= bool(values.any())
         numbers, first = np.unique(cubes.of(piece.points), return_index=True)
         fresh = np.append(taken, -1)[np.searchsorted(taken, numbers)] != numbers
         if fresh.any():
@@ -62,8 +62,11 @@ def thinned(
             kept.append(_rows(piece, np.sort(first[fresh]), kind))
     if not kept:
         raise InputError("has no point with finite coordinates")
-    if not has_colour:
-        raise InputError("has no colours to bake: all of its points are black")
+    if not has_shown:
+        fault = (
+            "all of its points are black" if kind == "colour" else "it is 0 at all of its points"
+        )
+        raise InputError(f"has no {SHOWN[kind]} to bake: {fault}")
     return _joined(kept, kind, kinds), count
 
 

@@ -4,7 +4,7 @@ import os
 import numpy as np
 import pytest
 
-from parapoint import InputError, Mesh, ParaPoint, cli
+from parapoint import ComputedMap, InputError, Mesh, ParaPoint, cli
 from parapoint.files import reading as files
 from parapoint.surfaces.across_seams import MOST_PIECES, edges_across_seam, opened
 from parapoint.testing import irregular_disk
@@ -28,6 +28,17 @@ def cloud(tmp_path):
     path = tmp_path / "cloud.xyz"
     np.savetxt(path, points / np.linalg.norm(points, axis=1, keepdims=True))
     return path
+
+
+@pytest.fixture(scope="module")
+def ball(tmp_path_factory):
+    """A saved model, its points beside it."""
+    folder = tmp_path_factory.mktemp("ball") / "model"
+    points = np.random.default_rng(0).normal(size=(300, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    np.savetxt(folder.with_suffix(".xyz"), points)
+    ComputedMap().fit(points).save(folder)
+    return folder
 
 
 @pytest.fixture
@@ -58,17 +69,51 @@ def test_fit_then_map_a_cloud(cloud, tmp_path, capsys) -> None:
     assert -0.5 < uv.min() <= uv.max() < 1.5
 
 
-def test_strays_of_other_points_are_named_and_mapped_nowhere(cloud, tmp_path, capsys) -> None:
+def test_strays_of_other_points_are_named_and_mapped_nowhere(
+    cloud, tmp_path, capsys, caplog
+) -> None:
     """Two of three points, of which one alone would be the whole cloud."""
     model, others, target = tmp_path / "model", tmp_path / "others.xyz", tmp_path / "map.ply"
     assert run(["fit", str(cloud), "--out", str(model)], capsys)[0] == 0
     others.write_text("900 0 0\n0 0 1\n0 -1e9 0\n")
-    status, out, err = run(["map", str(model), str(others), "--out", str(target)], capsys)
-    assert (status, err) == (0, "")
+    status, out, _ = run(["map", str(model), str(others), "--out", str(target)], capsys)
+    assert status == 0
+    assert "others.xyz: about 66.7 % of its points lie off the surface" in caplog.text
     assert "1 points mapped" in out
-    assert "2 points lie far from the surface: rows [0, 2] come first" in out
+    assert "2 points (66.7 %) lie far from the surface and have no UV: rows [0, 2] come" in out
     _, uv = files.read_point_map(target)
     assert np.isnan(uv.uv).all(axis=1).tolist() == [True, False, True]
+
+
+@pytest.mark.parametrize(
+    ("shift", "scale"),
+    [((5e5, 5e6, 100), 1), ((0, 0, 9), 1), ((0, 0, 0), 0.5), ((0, 0, 0), 1e6), ((0, 0, 0), 1e200)],
+)
+@pytest.mark.parametrize("ending", [".xyz", ".obj"])
+def test_what_is_not_on_the_surface_is_not_mapped(shift, scale, ending, ball, capsys) -> None:
+    """A cloud or a mesh in another place or unit: refused before anything is written."""
+    points = np.loadtxt(ball.with_suffix(".xyz")) * scale + shift
+    other, target = ball.with_name(f"other{ending}"), ball.with_name("map.ply")
+    if ending == ".xyz":
+        np.savetxt(other, points)
+    else:
+        points /= max(scale / 1e9, 1)  # no mesh is as large as some clouds are
+        lines = [f"v {x} {y} {z}" for x, y, z in points]
+        other.write_text("\n".join([*lines, "f 1 2 3"]))
+    status, out, err = run(["map", str(ball), str(other), "--out", str(target)], capsys)
+    assert (status, out) == (2, "")
+    assert err.count("\n") == 1
+    assert f"other{ending}: does not lie on the surface of the model: all of its points" in err
+    assert not target.exists()
+
+
+@pytest.mark.parametrize("scale", [1, 1 + 1e-3])
+def test_what_is_on_the_surface_is_mapped_without_a_word(scale, ball, tmp_path, capsys) -> None:
+    np.savetxt(tmp_path / "other.xyz", np.loadtxt(ball.with_suffix(".xyz"))[::7] * scale)
+    arguments = ["map", str(ball), str(tmp_path / "other.xyz"), "--out", str(tmp_path / "a.ply")]
+    status, out, err = run(arguments, capsys)
+    assert (status, err) == (0, "")
+    assert "no UV" not in out
 
 
 def test_unwrap_a_mesh_with_a_checkerboard(disk, tmp_path, capsys) -> None:

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from parapoint import InputError, PointCloud
+from parapoint.files.pieces import point_pieces
 from parapoint.files.point_writers import write_points
-from parapoint.files.reading import read_surface
+from parapoint.files.reading import read_polygons, read_surface
 
 POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 RGB = np.array([[255, 0, 0], [0, 128, 0], [1, 2, 3], [9, 8, 7]], dtype=np.uint8)
@@ -56,14 +57,15 @@ def test_ply_colours_and_scalars_keep_their_types(text, tmp_path) -> None:
     assert cloud.attributes["quality"].dtype == np.float32
 
 
-@pytest.mark.parametrize("packed", ["F", "U"])
+@pytest.mark.parametrize("alpha", [0, 254])
+@pytest.mark.parametrize("packed", ["F", "U", "I", "F as whole numbers", "I beyond its range"])
 @pytest.mark.parametrize("encoding", ["ascii", "binary"])
-def test_pcd_colours_are_unpacked(packed, encoding, tmp_path) -> None:
+def test_pcd_colours_are_unpacked(packed, encoding, alpha, tmp_path) -> None:
     code = (RGB.astype(np.uint32) << np.array([16, 8, 0], dtype=np.uint32)).sum(axis=1)
-    code = code.astype(np.uint32)
-    written = code.view(np.float32) if packed == "F" else code
+    code = code.astype(np.uint32) + np.uint32(alpha << 24)
+    written = {"F": code.view(np.float32), "I": code.view(np.int32)}.get(packed, code)
     header = (
-        f"VERSION 0.7\nFIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F {packed}\nCOUNT 1 1 1 1\n"
+        f"VERSION 0.7\nFIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F {packed[0]}\nCOUNT 1 1 1 1\n"
         f"WIDTH 4\nHEIGHT 1\nPOINTS 4\nDATA {encoding}\n"
     )
     if encoding == "ascii":
@@ -78,6 +80,50 @@ def test_pcd_colours_are_unpacked(packed, encoding, tmp_path) -> None:
     assert np.array_equal(cloud.attributes["colours"], RGB)
 
 
+@pytest.mark.parametrize(
+    ("fields", "says"),
+    [
+        ("x y z x", "the field 'x' twice"),
+        ("x y z rgb rgb", "the field 'rgb' twice"),
+        ("x y z _ _", ""),
+    ],
+)
+@pytest.mark.parametrize("encoding", ["ascii", "binary"])
+def test_pcd_fields_have_names_of_their_own(fields, says, encoding, tmp_path) -> None:
+    count = len(fields.split())
+    header = f"FIELDS {fields}\nSIZE{' 4' * count}\nTYPE{' F' * count}\nPOINTS 1\nDATA {encoding}\n"
+    row = np.arange(count, dtype="<f4")
+    body = row.tobytes() if encoding == "binary" else " ".join(map(str, row.tolist())).encode()
+    if says:
+        with pytest.raises(InputError, match=says):
+            read(tmp_path / "a.pcd", header.encode() + body)
+    else:
+        assert read(tmp_path / "a.pcd", header.encode() + body).points.tolist() == [[0, 1, 2]]
+
+
+@pytest.mark.parametrize(
+    ("rows", "says"),
+    [
+        (["0 0 0 1", "1 0 0 1 9"], "holds 5 numbers in row 1 .* the header announces 4"),
+        (["0 0 0", "1 0 0 1"], "holds 3 numbers in row 0"),
+        (["0 0 0 1 1 0 0 1"], "holds 8 numbers in row 0"),
+        (["0 0 0 1"], "ends early: 2 points are announced, 1 follow"),
+        (["0 0 0 1", "1 0 0 1", "2 0 0 1"], "2 points are announced, 3 follow"),
+    ],
+)
+def test_pcd_text_is_held_to_its_header(rows, says, tmp_path) -> None:
+    header = "FIELDS x y z i\nSIZE 4 4 4 4\nTYPE F F F F\nPOINTS 2\nDATA ascii\n"
+    with pytest.raises(InputError, match=says):
+        read(tmp_path / "a.pcd", header + "\n".join(rows))
+
+
+def test_pcd_packed_colours_are_whole_numbers(tmp_path) -> None:
+    header = "FIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F U\nPOINTS 1\nDATA ascii\n"
+    for word in ("0.5", "nan", "1e12"):
+        with pytest.raises(InputError, match="packed colour that is no whole number of 32 bits"):
+            read(tmp_path / "a.pcd", f"{header}0 0 0 {word}\n")
+
+
 @pytest.mark.parametrize(("scale", "kind"), [(1, np.uint8), (257, np.uint16)])
 def test_las_colours_are_of_8_or_16_bits(scale, kind, tmp_path) -> None:
     file = laspy.create(point_format=2, file_version="1.2")
@@ -89,6 +135,111 @@ def test_las_colours_are_of_8_or_16_bits(scale, kind, tmp_path) -> None:
     assert cloud.attributes["colours"].dtype == kind
     assert np.array_equal(cloud.attributes["colours"], RGB.astype(kind) * kind(scale))
     assert cloud.attributes["intensity"].tolist() == [1, 2, 3, 400]
+
+
+NAMES = [("red", "green", "blue"), ("Red", "Green", "Blue"), ("R", "G", "B"), ("r", "g", "b")]
+
+
+def ply_of(kind: str, names, values) -> str:
+    properties = [*(("float", axis) for axis in "xyz"), *((kind, name) for name in names)]
+    header = "".join(f"property {of} {name}\n" for of, name in properties)
+    return f"ply\nformat ascii 1.0\nelement vertex 4\n{header}end_header\n" + lines(POINTS, values)
+
+
+@pytest.mark.parametrize("names", [*NAMES, ("Diffuse_Red", "diffuse_green", "diffuse_blue")])
+def test_ply_names_of_colours_may_be_in_capitals(names, tmp_path) -> None:
+    cloud = read(tmp_path / "a.ply", ply_of("uchar", names, RGB))
+    assert list(cloud.attributes) == ["colours"]
+    assert np.array_equal(cloud.attributes["colours"], RGB)
+
+
+@pytest.mark.parametrize("kind", ["float", "double"])
+@pytest.mark.parametrize("shift", [0, 0.25, 0.5, -0.25])
+def test_floats_up_to_255_are_colours_under_their_name(kind, shift, tmp_path, caplog) -> None:
+    values = np.clip(RGB + shift, 0, 255)
+    cloud = read(tmp_path / "a.ply", ply_of(kind, NAMES[0], values))
+    assert cloud.attributes["colours"].dtype == np.uint8
+    assert np.array_equal(cloud.attributes["colours"], np.rint(values))
+    assert not caplog.text
+
+
+@pytest.mark.parametrize(
+    ("kind", "values", "says"),
+    [
+        ("float", RGB / 100, "from 0 to 2.55"),
+        ("float", RGB + 0.5, "from 0 to 255.5"),
+        ("int", RGB.astype(int) * 300, "from 0 to 76500"),
+        ("float", RGB - 3.0, "from -3 to 252"),
+        ("float", np.full((4, 3), np.nan), "from nan to nan"),
+    ],
+)
+def test_colours_of_no_known_range_are_told_and_kept_apart(
+    kind, values, says, tmp_path, caplog
+) -> None:
+    cloud = read(tmp_path / "a.ply", ply_of(kind, NAMES[0], values))
+    assert list(cloud.attributes) == list(NAMES[0])
+    assert len(caplog.records) == 1
+    assert f"colours left out: they go {says}, but not" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        (RGB, RGB),
+        (RGB.astype(np.int64), RGB),
+        (RGB / 255, RGB / 255),
+        (RGB.astype(np.float32) * 0.99, np.rint(RGB * 0.99)),
+        (np.hstack([RGB, RGB[:, :1]]), np.hstack([RGB, RGB[:, :1]])),
+        (RGB.astype(np.uint16) * 257, RGB.astype(np.uint16) * 257),
+    ],
+)
+def test_npz_colours_go_by_either_spelling(values, expected, tmp_path) -> None:
+    np.savez(tmp_path / "a.npz", points=POINTS, colors=values)
+    attributes = read_surface(tmp_path / "a.npz").attributes
+    assert list(attributes) == ["colours"]
+    assert np.array_equal(attributes["colours"], expected)
+    for name in ("colors", "colours"):
+        arrays = {"vertices": POINTS, "faces": [[0, 1, 2]], name: values}
+        np.savez(tmp_path / "b.npz", **arrays)
+        mesh = read_polygons(tmp_path / "b.npz")
+        assert np.array_equal(mesh.colours, expected)
+
+
+def test_npz_colours_that_are_none_keep_their_name(tmp_path, caplog) -> None:
+    np.savez(tmp_path / "a.npz", points=POINTS, colors=RGB / 50)
+    assert list(read_surface(tmp_path / "a.npz").attributes) == ["colors"]
+    assert "colours left out: they go from 0 to 5.1" in caplog.text
+
+
+@pytest.mark.parametrize(
+    "names", [("nx", "ny", "nz"), ("NX", "NY", "NZ"), ("NormalX", "NormalY", "NormalZ")]
+)
+def test_normals_of_las_stand_in_extra_dimensions(names, tmp_path) -> None:
+    header = laspy.LasHeader(point_format=3, version="1.2")
+    for name in names:
+        header.add_extra_dim(laspy.ExtraBytesParams(name, np.float32))
+    file = laspy.LasData(header)
+    file.x, file.y, file.z = POINTS.T
+    for name, values in zip(names, np.roll(POINTS, 1, axis=0).T, strict=True):
+        file[name] = values
+    file.write(tmp_path / "a.las")
+    cloud = read_surface(tmp_path / "a.las")
+    assert np.array_equal(cloud.normals, np.roll(POINTS, 1, axis=0))
+    assert not set(names) & set(cloud.attributes)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("scale", [0.0, np.nan, np.inf])
+def test_las_without_a_scale_is_refused(axis, scale, tmp_path) -> None:
+    file = laspy.create(point_format=2, file_version="1.2")
+    file.x, file.y, file.z = POINTS.T
+    file.write(tmp_path / "a.las")
+    data = bytearray((tmp_path / "a.las").read_bytes())
+    struct.pack_into("<d", data, 131 + 8 * axis, scale)
+    (tmp_path / "a.las").write_bytes(data)
+    for read_all in read_surface, lambda path: list(point_pieces(path)):
+        with pytest.raises(InputError, match=f"has the scale {scale:g} for {'xyz'[axis]}"):
+            read_all(tmp_path / "a.las")
 
 
 def test_las_without_colours_has_none(tmp_path) -> None:

@@ -17,15 +17,16 @@ def read(path, text):
     return read_surface(path)
 
 
-@pytest.mark.parametrize("first", [0, 1, 5])
-def test_a_first_column_numbers_the_rows_only_from_0_or_1(tmp_path, first):
-    rows = "\n".join(f"{first + k} {x} {y} {z}" for k, (x, y, z) in enumerate(PLACES))
+@pytest.mark.parametrize("first", [0, 1, 101, -3])
+@pytest.mark.parametrize("step", [1, 2])
+def test_a_first_column_numbers_the_rows_if_it_counts_up_by_one(tmp_path, first, step):
+    rows = "\n".join(f"{first + step * k} {x} {y} {z}" for k, (x, y, z) in enumerate(PLACES))
     cloud = read(tmp_path / "a.xyz", rows)
-    if first == 5:
-        assert_array_equal(cloud.points[:, 0], [5, 6, 7, 8])
-        assert_array_equal(cloud.attributes["intensity"], PLACES[:, 2])
-    else:
+    if step == 1:
         assert_array_equal(cloud.points, PLACES)
+    else:
+        assert_array_equal(cloud.points[:, 1:], PLACES[:, :2])
+        assert_array_equal(cloud.attributes["intensity"], PLACES[:, 2])
 
 
 @pytest.mark.parametrize(

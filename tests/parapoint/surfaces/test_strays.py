@@ -1,6 +1,7 @@
 """Stray points: found at any distance, named by row, mapped nowhere; nothing else is."""
 
 import logging
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -24,7 +25,8 @@ def flying(count: int, radii: float) -> FloatArray:
     rng = np.random.default_rng(1)
     points = rng.normal(size=(count, 3))
     length = radii * rng.uniform(0.3, 1, (count, 1))
-    return points / np.linalg.norm(points, axis=1, keepdims=True) * length
+    points *= length / np.linalg.norm(points, axis=1, keepdims=True)
+    return points
 
 
 @pytest.mark.parametrize("radii", [30, 500, 1e4, 1e6, 1e100])
@@ -174,3 +176,79 @@ def test_a_map_is_as_without_its_strays(caplog: pytest.LogCaptureFixture) -> Non
     assert np.isnan(found.uv[400:]).all()
     alone = ComputedMap().parameterize(PointCloud(points), seed=0)
     assert_array_equal(found.uv[:400], alone.uv)
+
+
+def box(count: int) -> FloatArray:
+    """Points on the sides of a cube."""
+    rng = np.random.default_rng(3)
+    points = rng.uniform(-1, 1, (count, 3))
+    points[np.arange(count), rng.integers(0, 3, count)] = rng.choice([-1, 1], count)
+    return points
+
+
+def tube(count: int) -> FloatArray:
+    """Points of an open tube, three times as long as it is wide."""
+    turn, z = np.random.default_rng(4).uniform([0, -3], [2 * np.pi, 3], (count, 2)).T
+    return np.column_stack([np.cos(turn), np.sin(turn), z])
+
+
+@pytest.mark.parametrize("surface", [dome, box, tube])
+@pytest.mark.parametrize("repeated", [1, 200])
+@pytest.mark.parametrize("unit", [1, 1e-4, 1e6])
+def test_a_place_alone_is_a_stray(
+    surface: Callable[[int], FloatArray], repeated: int, unit: float
+) -> None:
+    """A row without data inside of an object, nearer to it than thirty spacings."""
+    for places in ([[0, 0, 0]], [[0, 0, 0], [1.7, 0, 0.2], [0, -1.9, 0.4], [-1.8, 0, 0.6]]):
+        points = np.concatenate([surface(10_000), np.repeat(np.array(places, float), repeated, 0)])
+        expected = np.arange(len(points)) >= 10_000
+        assert_array_equal(stray_points(unit * points), expected)
+        assert_array_equal(stray_points(unit * points[::-1]), expected[::-1])
+
+
+@pytest.mark.parametrize("repeated", [1, 200])
+def test_a_row_without_data_inside_a_small_scan(repeated: int) -> None:
+    """A flat dome of 900 points, six of their spacings away."""
+    points = np.concatenate([dome(900) * [1, 1.2, 0.7], np.zeros((repeated, 3))])
+    assert_array_equal(stray_points(points), np.arange(len(points)) >= 900)
+
+
+def thinned(points: FloatArray, share: FloatArray) -> FloatArray:
+    """About this share (N,) of the points, drawn one by one."""
+    return points[np.random.default_rng(5).random(len(points)) < share]
+
+
+def rings(gap: float) -> FloatArray:
+    """Rings of a dome so many spacings apart; its pole is a ring of one point."""
+    slope = np.linspace(0, np.pi / 2, 15)
+    count = np.maximum(1, 2 * np.pi * np.sin(slope) / slope[1] * gap).astype(int)
+    turn = np.concatenate([np.arange(n) * 2 * np.pi / n for n in count])
+    slope = np.repeat(slope, count)
+    return np.column_stack(
+        [np.sin(slope) * np.cos(turn), np.sin(slope) * np.sin(turn), np.cos(slope)]
+    )
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        *(thinned(of, 300.0 ** -(of[:, 0] + 1)) for of in (dome(9000), box(9000), tube(9000))),
+        thinned(dome(9000), np.where(dome(9000)[:, 2] < 0.2, 0.02, 1)),
+        thinned(box(9000), np.where(box(9000)[:, 0] > 0.5, 0.02, 1)),
+        np.random.default_rng(6).normal(size=(3000, 3)) * [1, 1, 0],
+        np.random.default_rng(7).random((3000, 3)) ** 4 * [1, 1, 0],
+        *(rings(gap) for gap in (3, 12, 30, 100)),
+        *(np.concatenate([rings(gap)[1:], [[0, 0, 0.999]]]) for gap in (12, 30)),
+    ],
+)
+def test_sparse_parts_are_not_alone(points: FloatArray) -> None:
+    """Rims that thin out, sides that are sparser, and scans in rings whose pole is one point."""
+    assert not stray_points(points).any()
+
+
+def test_many_places_alone_are_how_a_cloud_is_sampled() -> None:
+    """A dozen of a thousand, as where a coarse part is joined to a fine one."""
+    x, y = np.meshgrid(np.arange(30.0), np.arange(30.0))
+    fine = np.column_stack([x.ravel(), y.ravel(), 0 * x.ravel()])
+    coarse = np.column_stack([np.full(12, 45.0), 25.0 * np.arange(12), np.zeros(12)])
+    assert not stray_points(np.concatenate([fine, coarse])).any()

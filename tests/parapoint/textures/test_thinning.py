@@ -152,6 +152,24 @@ def test_what_no_point_has_cannot_be_baked(kind, message) -> None:
             thinned([some, bare], kind, SQUARE, 8)
 
 
+@pytest.mark.parametrize(
+    ("kind", "name", "message"),
+    [
+        ("colour", "colours", "no colours to bake: all of its points are black"),
+        ("intensity", "intensity", "no intensity to bake: it is 0 at all of its points"),
+    ],
+)
+def test_what_is_0_at_all_points_was_never_taken(kind: str, name: str, message: str) -> None:
+    """Scanners leave room for it; one point that has some is enough."""
+    zeros = np.zeros((4, 3), np.uint8) if kind == "colour" else np.zeros(4, np.uint16)
+    none = PointCloud(CORNERS, attributes={name: zeros})
+    with pytest.raises(InputError, match=message):
+        thinned([none, none], kind, SQUARE, 8)
+    some = zeros.copy()
+    some[3] = 1
+    thinned([none, PointCloud(CORNERS, attributes={name: some})], kind, SQUARE, 8)
+
+
 def test_the_type_of_colours_goes_by_all_points() -> None:
     """Those that say that a colour has 16 bits may be ones that are left out."""
     first = np.array([[1.0, 1, 0]])
@@ -165,9 +183,6 @@ def test_the_type_of_colours_goes_by_all_points() -> None:
         made, _ = thinned(parts, "colour", SQUARE, 8)
         assert made.attributes["colours"].dtype == np.uint16
         np.testing.assert_array_equal(made.attributes["colours"], dark[:1])
-    black = PointCloud(same, attributes={"colours": dark * 0})
-    with pytest.raises(InputError, match="all of its points are black"):
-        thinned([black, black], "colour", SQUARE, 8)
     bright, dim = ({"colours": np.full((1, 3), value)} for value in (1.0, 0.5))
     whole_numbers = {"colours": np.full((1, 3), 200, dtype=np.uint8)}
     for other, is_good in ((bright, True), (dim, False)):

@@ -167,7 +167,7 @@ def ply_sheet(path, text) -> None:
     points, quads = grid()
     count = np.arange(len(points))
     names = [("double x", "d"), ("double y", "d"), ("double z", "d"), ("float u", "f")]
-    names += [("float v", "f"), ("uchar red", "B"), ("short q", "h")]
+    names += [("float v", "f"), ("uchar red", "B"), ("int64 q", "q")]
     vertex = np.column_stack([points, points[:, :2] / SIDE, count, -count])
     kind = "ascii" if text else "binary_big_endian"
     header = ["ply", f"format {kind} 1.0", "comment TextureFile old one.png", "comment by hand"]
@@ -421,6 +421,26 @@ def test_colours_of_vertices_are_painted(ending, tmp_path) -> None:
     at = middles(source)
     wanted = np.column_stack([40 * at[:, :2], np.full(len(at), 7)])
     assert np.abs(seen(out, np.asarray(Image.open(picture)), at) - wanted).max() <= 2
+
+
+@pytest.mark.parametrize("strip", ["face 0", "face 1"])
+def test_strips_are_painted_and_become_faces(strip, tmp_path) -> None:
+    """Beside faces or alone; a file of strips is written anew as its triangles."""
+    points = [f"{x} {y} {x * y}" for x in range(3) for y in range(3)]
+    lists = "property list uchar int vertex_indices"
+    header = ["ply", "format ascii 1.0", "comment TextureFile old one.png", "element vertex 9"]
+    header += [*(f"property float {axis}" for axis in "xyz"), "property float s"]
+    header += ["property float t", f"element {strip}", lists, "element tristrips 1", lists]
+    face = ["4 4 7 8 5"] * int(strip[-1])
+    rows = [f"{row} {0.1 * k} {0.2}" for k, row in enumerate(points)] + face
+    (tmp_path / "old.ply").write_text("\n".join([*header, "end_header", *rows, "6 0 3 1 4 2 5"]))
+    Image.fromarray(old_picture()).save(tmp_path / "old one.png")
+    given = read_polygons(tmp_path / "old.ply")
+    assert len(given.mesh.faces) == 4 + 2 * len(face)
+    painting = painting_of(tmp_path / "old.ply", given.polygon_of, given.uv)
+    assert painting.largest == 64
+    output = mesh_output(given, str(tmp_path / "old.ply"), str(tmp_path / "new.ply"), None, 4)
+    assert not output.is_rewritten
 
 
 def test_a_side_file_of_the_user_stays(tmp_path) -> None:
