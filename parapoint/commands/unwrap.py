@@ -81,7 +81,8 @@ def unwrap(
     checkerboard. Components are mapped one by one; with --components largest only that one is
     written. Branches of the seam grow where each lowers the energy (symmetric Dirichlet, 4 at
     least) by --seam-price (1) for a length of the square root of the area; or, with
-    --max-distortion, until the energy is as low and no longer, within --time-budget.
+    --max-distortion, until the energy is as low and no longer, within --time-budget. With
+    --per-vertex a vertex on a seam keeps one of its UVs, and the faces there span the map.
 
     --distortion isometric keeps angles and areas alike; balanced keeps angles as far as every part
     keeps its area; conformal keeps angles alone, whatever becomes of an ear or a finger.

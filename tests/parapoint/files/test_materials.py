@@ -232,3 +232,32 @@ def test_pictures_of_ply_are_found_alike(tmp_path: Path, caplog: pytest.LogCaptu
     painting = painting_of(path, given.polygon_of, given.uv)
     assert painting is not None
     assert painting.largest == 3
+
+
+@pytest.mark.parametrize(
+    "uses", [["foo"], ["foo", "bar # of old", "map"], ["two words", "foo", "foo"], ["K\u00f6rper"]]
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
+def test_materials_that_no_library_holds_show_the_new_texture(
+    uses: list[str], encoding: str, tmp_path: Path
+) -> None:
+    """A strip of triangles, the first of them without a material."""
+    count = len(uses) + 1
+    points = np.array([[k / count, k % 2, 0.0] for k in range(count + 2)])
+    lines = [f"v {x} {y} {z}" for x, y, z in points]
+    for k in range(count):
+        lines += [f"usemtl {uses[k - 1]}"] * (k > 0) + [f"f {k + 1} {k + 2} {k + 3}"]
+    source, out = tmp_path / "a.obj", tmp_path / "new.obj"
+    source.write_text("\n".join(lines) + "\n", encoding=encoding)
+    given = polygons(source)
+    placed = Charted(given.mesh, Parameterization(points[:, :2] / 2, given.mesh.faces))
+    output = mesh_output(given, str(source), str(out), 64, 4)
+    output.write(placed, output.picture(placed))
+    new = [line for line in out.read_bytes().splitlines() if line.startswith((b"usemtl", b"mtl"))]
+    kept = [f"usemtl {of}".encode(encoding) for of in uses]
+    assert new == [b"mtllib new.mtl", b"usemtl map", *kept]
+    painting = painting_of(out, np.arange(count), np.zeros((count, 3, 2)))
+    assert painting is not None
+    used = [painting.materials[k] for k in np.unique(painting.material_of)]
+    assert len(used) == len({"map", *uses})
+    assert all(one.picture is not None and one.picture.shape == (64, 64, 3) for one in used)

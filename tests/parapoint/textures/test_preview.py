@@ -74,7 +74,7 @@ def test_the_nearest_point_is_seen_in_its_light() -> None:
 
 
 @pytest.mark.parametrize("is_backed", [True, False])
-def test_a_pixel_that_no_point_of_a_sheet_fell_on_is_filled(is_backed) -> None:
+def test_a_pixel_that_no_point_of_a_sheet_fell_on_is_filled(is_backed: bool) -> None:
     """The sheet is red, with a point for each of 60 by 60 pixels; behind is green, or nothing."""
     y, z = (of.reshape(-1) for of in np.meshgrid(*2 * [np.linspace(-1, 1, 60)]))
     sheet = np.stack([np.ones(3600), y, z], axis=1)

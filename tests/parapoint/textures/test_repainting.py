@@ -32,14 +32,16 @@ ROSE = (255, 137, 137)
         (Material((255, 12, 255), GREY // 200 * 20), True, [20, 0, 20]),
     ],
 )
-def test_a_colour_tints_a_picture_as_light_does(material, tints, seen) -> None:
+def test_a_colour_tints_a_picture_as_light_does(
+    material: Material, tints: bool, seen: list[int]
+) -> None:
     painting = Painting((material,), np.zeros(2, dtype=np.int64), UV[FACES])
     picture = repainted(SQUARE, painting, 16, tints=tints)
     assert np.abs(picture.astype(int) - seen).max() <= 1
 
 
 @pytest.mark.parametrize(("source", "seen"), [("a.glb", 106), ("a.GLTF", 106), ("a.obj", 200)])
-def test_only_the_colours_of_gltf_tint_pictures(source, seen) -> None:
+def test_only_the_colours_of_gltf_tint_pictures(source: str, seen: int) -> None:
     """In a Wavefront library they stand for the picture, and are often black beside one."""
     painting = Painting((Material(ROSE, GREY),), np.zeros(2, dtype=np.int64), UV[FACES])
     given = Polygons(SQUARE.mesh, FACES, np.arange(2), ())

@@ -73,13 +73,15 @@ def with_t_junction(mesh: Mesh) -> Mesh:
     apex, before, after = np.roll(face, -first).tolist()
     rest = [f for f in mesh.faces.tolist() if f != face]
     split = [[apex, before, 25], [apex, 25, after], [before, after, 25]]
-    return Mesh(np.concatenate([mesh.vertices, ends.mean(axis=0, keepdims=True)]), rest + split)
+    return Mesh(
+        np.concatenate([mesh.vertices, ends.mean(axis=0, keepdims=True)]), np.array(rest + split)
+    )
 
 
 def with_copies(mesh: Mesh) -> Mesh:
     """The mesh with its first face again, and one without area, as exports have them."""
     faces = [*mesh.faces.tolist(), mesh.faces[0].tolist(), [0, 1, 1]]
-    return Mesh(mesh.vertices, faces)
+    return Mesh(mesh.vertices, np.array(faces))
 
 
 @pytest.mark.parametrize(
@@ -94,7 +96,9 @@ def with_copies(mesh: Mesh) -> Mesh:
         (soup(with_t_junction(sheet())), MIDDLE),
     ],
 )
-def test_a_mesh_that_must_be_mended_is_cut_where_it_is_said_and_nowhere_else(made, seams) -> None:
+def test_a_mesh_that_must_be_mended_is_cut_where_it_is_said_and_nowhere_else(
+    made: Mesh, seams: list[tuple[int, int]]
+) -> None:
     """Any way the sheet is written, it falls into the halves on either side of its middle."""
     at = with_t_junction(sheet()).vertices[np.array(seams)]
     there = (made.vertices[:, None] == at.reshape(-1, 3)).all(axis=2).argmax(axis=0)

@@ -137,31 +137,6 @@ def test_a_picture_that_cannot_be_read_is_one_line(textured, tmp_path) -> None:
         written(textured, tmp_path / "new.obj")
 
 
-@pytest.mark.parametrize(
-    "uses", [["foo"], ["foo", "bar # of old", "map"], ["two words", "foo", "foo"], ["K\u00f6rper"]]
-)
-@pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
-def test_materials_that_no_library_holds_show_the_new_texture(uses, encoding, tmp_path) -> None:
-    points, quads = grid()
-    lines = [f"v {x} {y} {z}" for x, y, z in points]
-    for k, quad in enumerate(quads):
-        lines += [f"usemtl {uses[k - 1]}"] if 0 < k <= len(uses) else []
-        lines.append("f " + " ".join(str(at + 1) for at in quad))
-    source, out = tmp_path / "a.obj", tmp_path / "new.obj"
-    source.write_text("\n".join(lines) + "\n", encoding=encoding)
-    written(source, out)
-    new = [line for line in out.read_bytes().splitlines() if line.startswith((b"usemtl", b"mtl"))]
-    assert new == [
-        b"mtllib new.mtl",
-        b"usemtl map",
-        *(f"usemtl {of}".encode(encoding) for of in uses),
-    ]
-    painting = painting_of(out, np.arange(len(quads)), np.zeros((len(quads), 3, 2)))
-    used = [painting.materials[k] for k in np.unique(painting.material_of)]
-    assert len(used) == len({"map", *uses})
-    assert all(one.picture.shape == (256, 256, 3) for one in used)
-
-
 def ply_sheet(path, text) -> None:
     """The sheet as PLY with all sorts of properties, of either encoding."""
     points, quads = grid()
