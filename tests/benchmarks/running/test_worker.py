@@ -215,7 +215,7 @@ from pathlib import Path
 from typing import ClassVar
 
 @dataclass(frozen=True)
-class Sleeper:
+class Lingerer:
     requires: ClassVar[frozenset[str]] = frozenset()
 
     def parameterize(self, surface, *, seed):
@@ -229,7 +229,7 @@ def test_a_supervisor_ends_with_its_cell_once_the_run_is_gone(tmp_path: Path) ->
     with Store(tmp_path).writing():
         surface = Store(tmp_path).add_surface(TRIANGLE)
     (tmp_path / "plugin.py").write_text(SLEEPER)
-    plugin = f"{tmp_path}/plugin.py:Sleeper"
+    plugin = f"{tmp_path}/plugin.py:Lingerer"
     spec = registry.register_plugin(plugin)
     (tmp_path / "work").mkdir()
     job = RunJob(
