@@ -2,6 +2,8 @@
 
 import pytest
 
+from parapoint.files import decoding
+
 
 @pytest.fixture(autouse=True, scope="session")
 def nothing_is_installed():
@@ -18,3 +20,9 @@ def output_is_buffered():
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv("PYTHONUNBUFFERED", raising=False)
         yield
+
+
+@pytest.fixture(autouse=True)
+def files_decode_to_little():
+    """What one test allows files to decode to, as by `--memory`, is not allowed in the next."""
+    decoding.allow(decoding.DECODED_LEAST)
