@@ -126,7 +126,7 @@ def test_a_face_with_its_vertex_on_its_long_edge_leaves_no_slit():
     apex = next(vertex for vertex in other if vertex not in (a, c))
     rest = [f for f in whole.faces.tolist() if f not in ([a, c, d], other)]
     points = np.concatenate([whole.vertices, whole.vertices[[a, c]].mean(axis=0, keepdims=True)])
-    faces = [[a, middle, c], [a, c, d], [c, middle, apex], [middle, a, apex], *rest]
+    faces = [[a, middle, c], [c, middle, apex], [middle, a, apex], *rest, [a, c, d]]
     mesh = Mesh(points, faces)
     assert mesh.topology == "sphere"
     assert flat_faces(mesh.vertices, mesh.faces).sum() == 1
