@@ -50,7 +50,7 @@ FORMATS: dict[str, Callable[[bytes, Path], Content]] = {
     ".stl": lambda data, _: stl(data),
     ".glb": gltf,
     ".gltf": gltf,
-    ".xyz": lambda data, _: xyz(data),
+    **dict.fromkeys((".xyz", ".txt", ".csv", ".asc"), lambda data, _: xyz(data)),
     ".pts": lambda data, _: pts(data),
     ".pcd": lambda data, _: pcd(data),
     ".las": lambda data, _: las(data),

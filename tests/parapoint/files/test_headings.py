@@ -241,3 +241,9 @@ def test_numbers_are_read_as_meant_or_refused(between: str, point: str) -> None:
                         xyz(text.encode())
                 else:
                     assert_array_equal(xyz(text.encode()).vertices, values[:, :3], text)
+
+
+@pytest.mark.parametrize("ending", [".xyz", ".txt", ".csv", ".asc", ".CSV"])
+def test_a_text_cloud_may_have_any_of_its_endings(tmp_path: Path, ending: str) -> None:
+    cloud = cloud_of(tmp_path, "id,x,y,z\n7,1,2,3\n9,4,5,6\n", ending)
+    assert_array_equal(cloud.points, [[1, 2, 3], [4, 5, 6]])
