@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from parapoint.errors import InputError
-from parapoint.files.attributes import colours_of, named_attributes
+from parapoint.files.attributes import colours_of, named_attributes, taken_normals
 from parapoint.files.content import Content, points_content
 from parapoint.files.headings import Heading
 from parapoint.surfaces.surface import FloatArray
@@ -54,10 +54,7 @@ class Columns(NamedTuple):
             name = self.names[at]
             is_free = name and name not in RESERVED and name not in columns
             columns[name if is_free else f"column{at + 1}"] = values[:, k]
-        normals = None
-        if {"nx", "ny", "nz"} <= set(columns):
-            normals = np.stack([columns[name] for name in ("nx", "ny", "nz")], axis=1)
-        return points_content(values[:, :3], normals, named_attributes(columns))
+        return points_content(values[:, :3], taken_normals(columns), named_attributes(columns))
 
 
 def columns_of(
