@@ -267,6 +267,9 @@ def _file_seeds() -> dict[str, list[bytes]]:
         "glb": [_exported(mesh, "glb")],
         "gltf": [tree["model.gltf"]],
         "xyz": [rows.encode(), rows.replace(" ", ",").encode()],
+        "txt": [rows.replace(" ", "\t").encode()],
+        "csv": [f"x,y,z\n{rows.replace(' ', ',')}".encode()],
+        "asc": [rows.encode()],
         "pts": [f"4\n{rows}\n".encode()],
         "pcd": [
             f"{header}ascii\n{rows}\n".encode(),
