@@ -20,8 +20,7 @@ from parapoint.fitting import Progress
 from parapoint.method import UnsupportedError
 from parapoint.planar.domains import FlatteningError
 from parapoint.surfaces.parameterization import Charted, Parameterization
-from parapoint.surfaces.preparation import first_equal, welded
-from parapoint.surfaces.surface import IntArray, Mesh
+from parapoint.surfaces.surface import IntArray, Mesh, first_equal
 from parapoint.textures.packing import packed
 from parapoint.textures.preview import write_preview
 from parapoint.unwrapping.given import mended_along
@@ -96,7 +95,7 @@ def unwrap_mesh(
         facts["overlap"] = "unknown"  # a face that was left out may lie on another
     parts = [part for part in _parts(made) if "end_energy" in part]
     facts["energy"] = round(max(float(str(part["end_energy"])) for part in parts), 4)
-    facts["components"] = welded(mesh).component_count
+    facts["components"] = mesh.welded.component_count
     facts |= written
     facts["seconds"] = round(time.perf_counter() - began, 1)
     _warn_of_bound(facts, request)
@@ -167,7 +166,7 @@ def read_seams(path: str, mesh: Mesh) -> IntArray:
         InputError: the file cannot be read, or a line is no edge of the mesh.
     """
     first = first_equal(mesh.vertices)
-    known = {frozenset(edge) for edge in welded(mesh).edges.tolist()}
+    known = {frozenset(edge) for edge in mesh.welded.edges.tolist()}
     found = []
     for number, line in enumerate(Path(path).read_text(errors="replace").splitlines(), start=1):
         words = line.split("#", 1)[0].split()

@@ -9,7 +9,6 @@ from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
-from parapoint.surfaces.preparation import welded
 from parapoint.surfaces.scan_lines import breadth
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh, Surface
 
@@ -36,7 +35,7 @@ def parts_of(surface: Surface, which: str) -> list[Surface]:
         which: one of COMPONENTS.
     """
     if which == "together":
-        if isinstance(surface, Mesh) and (count := welded(surface).component_count) > 1:
+        if isinstance(surface, Mesh) and (count := surface.welded.component_count) > 1:
             logger.warning(
                 "%d components: one map is fitted to all of them; --components each or largest "
                 "fits them apart",
@@ -57,7 +56,7 @@ def components(surface: Surface) -> list[Surface]:
     components of the graph that joins each point to its NEIGHBOURS nearest and the next scan line.
     """
     if isinstance(surface, Mesh):
-        label = welded(surface).face_components
+        label = surface.welded.face_components
         area = np.bincount(label, weights=surface.face_areas)
         order = [k for k in np.argsort(-area, kind="stable") if area[k] > 0]
         return [_submesh(surface, label == k) for k in order] or [surface]
@@ -68,7 +67,7 @@ def components(surface: Surface) -> list[Surface]:
 
 def largest_component(mesh: Mesh) -> tuple[Mesh, BoolArray]:
     """The component of the largest area, and (F,) which faces are its."""
-    label = welded(mesh).face_components
+    label = mesh.welded.face_components
     chosen = label == np.bincount(label, weights=mesh.face_areas).argmax()
     return _submesh(mesh, chosen), chosen
 

@@ -179,7 +179,7 @@ def _repaired(mesh: Mesh, words: frozenset[str]) -> tuple[list[Mesh], list[str],
         if count:
             steps.append(f"{step} {count} {thing if count == 1 else plural or thing + 's'}")
 
-    whole = welded(mesh)
+    whole = mesh.welded
     note(int(mesh.referenced.sum() - whole.referenced.sum()), "welded", "vertex", "vertices")
     solid = (whole.faces != np.roll(whole.faces, 1, axis=1)).all(axis=1)
     if flat_faces(whole.vertices, whole.faces).all():
@@ -214,22 +214,6 @@ def _repaired(mesh: Mesh, words: frozenset[str]) -> tuple[list[Mesh], list[str],
     parts = [_compact(made.vertices, faces) for faces in np.split(made.faces[order], bounds)]
     note(len(parts) if len(parts) > 1 else 0, "packed", "component")
     return parts, steps, _origin(whole.faces, place[order])
-
-
-def welded(mesh: Mesh) -> Mesh:
-    """The mesh with every face at the first of the vertices at each place."""
-    return Mesh(mesh.vertices, first_equal(mesh.vertices)[mesh.faces])
-
-
-def first_equal(rows: FloatArray) -> IntArray:
-    """(N,) for each row of (N, k), the first of those that equal it."""
-    order = np.lexsort(rows.T)  # rows that are equal keep their order
-    ordered = rows[order]
-    is_new = np.ones(len(rows), dtype=bool)
-    is_new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    first = np.empty(len(rows), dtype=np.int64)
-    first[order] = order[is_new][np.cumsum(is_new) - 1]
-    return first
 
 
 def _first_of_each(rows: IntArray) -> BoolArray:

@@ -82,6 +82,17 @@ def flat_faces(vertices: FloatArray, faces: IntArray) -> BoolArray:
     return np.asarray(flat, dtype=bool)
 
 
+def first_equal(rows: FloatArray) -> IntArray:
+    """(N,) for each row of (N, k), the first of those that equal it."""
+    order = np.lexsort(rows.T)  # rows that are equal keep their order
+    ordered = rows[order]
+    is_new = np.ones(len(rows), dtype=bool)
+    is_new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    first = np.empty(len(rows), dtype=np.int64)
+    first[order] = order[is_new][np.cumsum(is_new) - 1]
+    return first
+
+
 def unit_normals(points: FloatArray, triangles: IntArray) -> FloatArray:
     """(T, 3) unit normals of triangles (T, 3); 0 of those without area."""
     a, b, c = (points[triangles[:, k]] for k in range(3))
@@ -188,6 +199,11 @@ class Mesh:
     def euler_characteristic(self) -> int:
         """Referenced vertices - edges + faces."""
         return int(self.referenced.sum()) - len(self.edges) + len(self.faces)
+
+    @cached_property
+    def welded(self) -> Mesh:
+        """This mesh with every face at the first of the vertices at each place."""
+        return Mesh(self.vertices, first_equal(self.vertices)[self.faces])
 
     @cached_property
     def face_components(self) -> IntArray:

@@ -11,8 +11,8 @@ from parapoint.planar.descent import Run
 from parapoint.planar.domains import check_triangles
 from parapoint.surfaces.cutting import cut_along, cut_to_disk, edge_lengths, edge_mask
 from parapoint.surfaces.parameterization import Parameterization
-from parapoint.surfaces.preparation import Preparation, first_equal, prepared
-from parapoint.surfaces.surface import BoolArray, IntArray, Mesh, flat_faces
+from parapoint.surfaces.preparation import Preparation, prepared
+from parapoint.surfaces.surface import BoolArray, IntArray, Mesh, first_equal, flat_faces
 from parapoint.unwrapping.packing import by_component
 
 

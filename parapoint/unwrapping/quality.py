@@ -12,8 +12,14 @@ from scipy.sparse import csgraph
 from parapoint.planar.crossing import crossing_vertices
 from parapoint.surfaces.areas import LEAST_PART, STARVED
 from parapoint.surfaces.parameterization import Charted, Parameterization
-from parapoint.surfaces.preparation import first_equal, welded
-from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh, flat_faces, twin_halfedges
+from parapoint.surfaces.surface import (
+    BoolArray,
+    FloatArray,
+    Mesh,
+    first_equal,
+    flat_faces,
+    twin_halfedges,
+)
 from parapoint.textures.texels import texels
 
 DOUBLED = 1e-6
@@ -111,7 +117,7 @@ def quality(placed: Charted, texture: int) -> Quality:
 
 def _welded(placed: Charted) -> Charted:
     """The mesh welded, and its map with one row for all corners at one vertex and one uv."""
-    whole, held = welded(placed.mesh), placed.map
+    whole, held = placed.mesh.welded, placed.map
     if np.array_equal(whole.faces, placed.mesh.faces):
         return placed
     uv = held.uv[held.corners.reshape(-1)]
