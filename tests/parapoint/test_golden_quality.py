@@ -17,8 +17,9 @@ from parapoint.surfaces.preparation import prepared
 SEAM_EDGES = 0.03
 """Relative change of the number of seam edges that is let pass. Vertices moved by 1e-14 to 1e-12 of
 their coordinates, as another processor's sums would, left it as it is on all these models."""
-LATER = 0.5
-"""Relative change of a loss where rounding has had its steps to grow: 0.2 was seen."""
+LATER = 1.0
+"""Relative change of a loss where rounding has had its steps to grow: 0.2 was seen on processors of
+Intel, 0.48 on one of AMD."""
 
 
 def model(name):
@@ -66,10 +67,10 @@ def test_maps_of_the_mesh_method_are_as_good_as_before(case):
 
 @pytest.mark.parametrize(
     ("run", "exact", "tolerance"),
-    # How many steps rounding leaves alone, and how far the totals then are apart: vertices moved by
-    # 2e-7 of their coordinates moved them by 1e-7, 4e-5 and 1e-4. A chosen neighbour may change, so
-    # terms are held to a hundredth.
-    [("paper", 6, 1e-5), ("paper_adamw", 20, 3e-4), ("learned", 2, 1e-3)],
+    # How many steps rounding leaves alone, and how far the totals then are apart: another processor
+    # moved them by 1.3e-4, 4e-5 and 2e-6, vertices moved by 2e-7 of their coordinates by 1e-7, 4e-5
+    # and 1e-4. A chosen neighbour may change, so terms are held to a hundredth.
+    [("paper", 6, 5e-4), ("paper_adamw", 20, 3e-4), ("learned", 2, 1e-3)],
 )
 def test_the_first_losses_are_as_before(run, exact, tolerance):
     model("hand_1_i_f5000")
