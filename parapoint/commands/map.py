@@ -36,7 +36,7 @@ def map_(model: str, surface: str, out: str, device: str, *, force: bool, as_jso
     the unit square. A mesh written as OBJ is cut along the seams of the map: a face that lies
     across one keeps its shape and stays on one side.
     """
-    out = target(out, surface, force=force, textured=False)
+    out = target(out, [surface], force=force, textured=False)
     from parapoint.estimator import load
 
     with bar() as tell:

@@ -36,12 +36,12 @@ TEXTURE = 2048
 """Texels along a side of a texture, if none were asked for."""
 
 
-def target(out: str, surface: str, *, force: bool, textured: bool) -> str:
+def target(out: str, inputs: list[str], *, force: bool, textured: bool) -> str:
     """The file to write for `out`, checked before any work (`parapoint.files.targets`).
 
     Args:
         out: the file that the user named.
-        surface: the file that is read.
+        inputs: the files that are read.
         force: replace whatever is there.
         textured: whether a texture was asked for.
 
@@ -52,16 +52,16 @@ def target(out: str, surface: str, *, force: bool, textured: bool) -> str:
     if ending not in ENDINGS:
         raise InputError(f"{out}: cannot write this ending; take {', '.join(ENDINGS)}")
     sides = SIDES.get(ending, ()) if textured or ending == ".obj" else ()
-    return str(checked_target(out, sides=sides, inputs=[surface], force=force))
+    return str(checked_target(out, sides=sides, inputs=inputs, force=force))
 
 
-def preview_target(preview: str, out: str, surface: str, *, force: bool) -> Path:
+def preview_target(preview: str, out: str, inputs: list[str], *, force: bool) -> Path:
     """The file for the picture beside `out`, checked before any work.
 
     Raises:
         InputError: it is no .png or the texture of `out`, or it cannot or may not be written.
     """
-    path = checked_picture(preview, inputs=[surface], force=force)
+    path = checked_picture(preview, inputs=inputs, force=force)
     is_textured = Path(out).suffix.lower() in SIDES
     if is_textured and path.resolve() == beside(Path(out).resolve(), ".png"):
         raise InputError(f"{preview}: is the texture of {out}; take another name")

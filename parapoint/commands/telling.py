@@ -11,7 +11,12 @@ logger = logging.getLogger("parapoint")
 Facts = dict[str, object]
 """What is known of a map by name: `parapoint.unwrapping.quality`, and what a command adds."""
 
-COUNTS = {"mapped_points": "points mapped", "faces": "faces", "iterations": "iterations"}
+COUNTS = {
+    "mapped_points": "points mapped",
+    "faces": "faces",
+    "welded": "doubled vertices taken as one",
+    "iterations": "iterations",
+}
 """What is counted in the first line, and in which words."""
 
 ADVICE_OF_MESHES = {
@@ -34,7 +39,7 @@ ADVICE_OF_MAPS = {
 def lines(facts: Facts) -> str:
     """The facts of a map in a few lines for a reader."""
     of = {name: str(value) for name, value in facts.items()}
-    counts = [f"{of[name]} {word}" for name, word in COUNTS.items() if name in of]
+    counts = [f"{of[name]} {word}" for name, word in COUNTS.items() if facts.get(name)]
     angles = f"angles off by {of['angle_mean']}° in the mean, {of['angle_worst']}° at worst"
     stretch = f"stretch {of['stretch_mean']} in the mean, {of['stretch_worst']} at worst"
     part = f"smallest part at {of['smallest_part']} of its fair area"

@@ -54,7 +54,7 @@ from parapoint.textures.placing import BORDER
 )
 @click.option("--seam-price", type=float, metavar="P", help="Energy a branch must gain a length.")
 @click.option("--max-distortion", type=float, metavar="E", help="Cut on until the energy is E.")
-@click.option("--seams", metavar="FILE", help="Cut along these edges: two vertex numbers a line.")
+@click.option("--seams", metavar="FILE", help="Cut along its edges, or the seams of its map.")
 @click.option("--per-vertex", is_flag=True, help="One uv for each vertex, whatever the seams.")
 @click.option("--texture", type=int, metavar="N", help="Texels along a side of a texture.")
 @click.option("--margin", type=int, metavar="TEXELS", help="Free texels around the map.")
@@ -70,6 +70,7 @@ def unwrap(
     texture: int | None,
     margin: int | None,
     preview: str | None,
+    seams: str | None,
     force: bool,
     as_json: bool,
     **options: Any,
@@ -84,16 +85,20 @@ def unwrap(
     --max-distortion, until the energy is as low and no longer, within --time-budget. With
     --per-vertex a vertex on a seam keeps one of its UVs, and the faces there span the map.
 
+    The FILE of --seams lists edges, two vertex numbers a line; or it is a mesh that has UVs, such
+    as INPUT itself, and the seams of its map are followed.
+
     --distortion isometric keeps angles and areas alike; balanced keeps angles as far as every part
     keeps its area; conformal keeps angles alone, whatever becomes of an ear or a finger.
 
     Of a cloud FILE.glb is a mesh of it, with its colours baked into a texture (a checkerboard where
     it has none); so are .obj and .ply with --texture. Without they are its points and their UVs.
     """
-    out = target(out, surface, force=force, textured=texture is not None)
+    inputs = [surface] if seams is None else [surface, seams]
+    out = target(out, inputs, force=force, textured=texture is not None)
     check_size(TEXTURE if texture is None else texture, margin or 0)
-    picture = None if preview is None else preview_target(preview, out, surface, force=force)
-    asked = Asked(surface, out, texture, margin, picture, force, **options)
+    picture = None if preview is None else preview_target(preview, out, inputs, force=force)
+    asked = Asked(surface, out, texture, margin, picture, force, seams=seams, **options)
     with bar() as tell:
         tell(Progress("reading"))
         given = read_polygons(surface)

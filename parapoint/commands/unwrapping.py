@@ -12,6 +12,7 @@ import click
 import numpy as np
 
 from parapoint import clock
+from parapoint.commands.given_seams import read_seams
 from parapoint.commands.mesh_output import MeshOutput
 from parapoint.commands.progress import Tell, untold
 from parapoint.commands.telling import ADVICE_OF_MESHES, warn
@@ -20,7 +21,7 @@ from parapoint.fitting import Progress
 from parapoint.method import UnsupportedError
 from parapoint.planar.domains import FlatteningError
 from parapoint.surfaces.parameterization import Charted, Parameterization
-from parapoint.surfaces.surface import IntArray, Mesh, first_equal
+from parapoint.surfaces.surface import Mesh
 from parapoint.textures.packing import packed
 from parapoint.textures.preview import write_preview
 from parapoint.unwrapping.given import mended_along
@@ -96,6 +97,7 @@ def unwrap_mesh(
     parts = [part for part in _parts(made) if "end_energy" in part]
     facts["energy"] = round(max(float(str(part["end_energy"])) for part in parts), 4)
     facts["components"] = mesh.welded.component_count
+    facts["welded"] = int(mesh.referenced.sum() - mesh.welded.referenced.sum())
     facts |= written
     facts["seconds"] = round(time.perf_counter() - began, 1)
     _warn_of_bound(facts, request)
@@ -155,34 +157,6 @@ def _made(mesh: Mesh, request: Request, output: MeshOutput) -> Parameterization:
         raise InputError(f"{output.source}: {error}") from None
     except FlatteningError as error:
         raise click.ClickException(f"{output.source}: {error}") from error
-
-
-def read_seams(path: str, mesh: Mesh) -> IntArray:
-    """(S, 2) the edges in a text file: two vertex numbers a line, counted from 1 as OBJ does.
-
-    Of several vertices at one place, either end may name any.
-
-    Raises:
-        InputError: the file cannot be read, or a line is no edge of the mesh.
-    """
-    first = first_equal(mesh.vertices)
-    known = {frozenset(edge) for edge in mesh.welded.edges.tolist()}
-    found = []
-    for number, line in enumerate(Path(path).read_text(errors="replace").splitlines(), start=1):
-        words = line.split("#", 1)[0].split()
-        if not words:
-            continue
-        try:
-            one, other = (int(word) - 1 for word in words)
-        except ValueError:
-            raise InputError(f"{path}: line {number} is not two vertex numbers") from None
-        ends = [one, other]
-        if min(ends) < 0 or max(ends) >= len(first) or frozenset(first[ends].tolist()) not in known:
-            raise InputError(f"{path}: line {number} is no edge of the mesh")
-        found.append(ends)
-    if not found:
-        raise InputError(f"{path}: has no edge")
-    return np.array(found, dtype=np.int64)
 
 
 def _parts(made: Parameterization) -> list[dict[str, object]]:

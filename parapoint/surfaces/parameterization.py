@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from parapoint.errors import InputError
+from parapoint.surfaces.places import places, same_place
 from parapoint.surfaces.surface import (
     BoolArray,
     FloatArray,
@@ -103,6 +104,15 @@ class Parameterization:
         """
         return self._charts
 
+    def shared_at(self, faces: IntArray) -> Parameterization:
+        """This map with one row of uv for all corners of `faces` (F, 3) of one vertex and uv."""
+        uv = self.uv[self.corners.reshape(-1)]
+        in_the_plane = places(uv, same_place(uv))
+        row = places(np.stack([faces.reshape(-1), in_the_plane], axis=1))
+        shared = np.empty((int(row.max()) + 1, 2))
+        shared[row] = uv
+        return Parameterization(shared, row.reshape(-1, 3))
+
     def seams(self, mesh: Mesh) -> IntArray:
         """(S, 2) interior edges of `mesh` along which the map is cut, smaller vertex first.
 
@@ -134,6 +144,13 @@ class Charted(NamedTuple):
 
     mesh: Mesh
     map: Parameterization
+
+    def welded(self) -> Charted:
+        """The same with one vertex at each place, and one uv where several agree there."""
+        mesh = self.mesh.welded
+        if np.array_equal(mesh.faces, self.mesh.faces):
+            return self
+        return Charted(mesh, self.map.shared_at(mesh.faces))
 
     def turned(self) -> Charted:
         """The other side up: faces turned round, and the plane mirrored, so that none flips."""

@@ -15,10 +15,15 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from parapoint.errors import InputError
+from parapoint.surfaces.places import first_of_each, places, same_place
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
+
+SHORT = 1e-3
+"""Vertices are at one place only if they are nearer than this share of the median edge, too: small
+things that lie far apart in one file keep their vertices."""
 
 
 def read_only(values: Any, dtype: type[np.generic], name: str, columns: int) -> npt.NDArray[Any]:
@@ -80,17 +85,6 @@ def flat_faces(vertices: FloatArray, faces: IntArray) -> BoolArray:
     longest = igl.squared_edge_lengths(vertices, faces[suspects]).max(axis=1, initial=0)
     flat[suspects] = double_area[suspects] <= relative * longest
     return np.asarray(flat, dtype=bool)
-
-
-def first_equal(rows: FloatArray) -> IntArray:
-    """(N,) for each row of (N, k), the first of those that equal it."""
-    order = np.lexsort(rows.T)  # rows that are equal keep their order
-    ordered = rows[order]
-    is_new = np.ones(len(rows), dtype=bool)
-    is_new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    first = np.empty(len(rows), dtype=np.int64)
-    first[order] = order[is_new][np.cumsum(is_new) - 1]
-    return first
 
 
 def unit_normals(points: FloatArray, triangles: IntArray) -> FloatArray:
@@ -201,9 +195,17 @@ class Mesh:
         return int(self.referenced.sum()) - len(self.edges) + len(self.faces)
 
     @cached_property
+    def place(self) -> IntArray:
+        """(V,) the first of all vertices that lie at the place of each, as `places` tells them."""
+        ends = self.vertices[self.edges]
+        typical = float(np.median(np.abs(ends[:, 0] - ends[:, 1]).max(axis=1)))
+        tolerance = min(same_place(self.vertices[self.referenced]), SHORT * typical)
+        return first_of_each(places(self.vertices, tolerance))
+
+    @cached_property
     def welded(self) -> Mesh:
         """This mesh with every face at the first of the vertices at each place."""
-        return Mesh(self.vertices, first_equal(self.vertices)[self.faces])
+        return Mesh(self.vertices, self.place[self.faces])
 
     @cached_property
     def face_components(self) -> IntArray:

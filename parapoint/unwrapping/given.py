@@ -12,7 +12,7 @@ from parapoint.planar.domains import check_triangles
 from parapoint.surfaces.cutting import cut_along, cut_to_disk, edge_lengths, edge_mask
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.preparation import Preparation, prepared
-from parapoint.surfaces.surface import BoolArray, IntArray, Mesh, first_equal, flat_faces
+from parapoint.surfaces.surface import BoolArray, IntArray, Mesh, flat_faces
 from parapoint.unwrapping.packing import by_component
 
 
@@ -28,12 +28,11 @@ def mended_along(mesh: Mesh, seams: IntArray, deadline: float = math.inf) -> Par
         UnsupportedError: no face has an area.
         FlatteningError: a chart has no start without flips.
     """
-    first = first_equal(mesh.vertices)
-    whole = Mesh(mesh.vertices, first[mesh.faces])
+    whole = mesh.welded
     preparation = prepared(whole, frozenset({"manifold", "oriented"}))
     (part,) = preparation.parts
     assert isinstance(part, Mesh)
-    cut = _beside_flat_faces(whole, edge_mask(whole, first[seams]))
+    cut = _beside_flat_faces(whole, edge_mask(whole, mesh.place[seams]))
     made = unwrapped_along(part, _carried(whole, cut, preparation, part), deadline)
     joined = preparation.joined([made])
     assert isinstance(joined, Parameterization)

@@ -11,12 +11,12 @@ from scipy.sparse import csgraph
 
 from parapoint.planar.crossing import crossing_vertices
 from parapoint.surfaces.areas import LEAST_PART, STARVED
-from parapoint.surfaces.parameterization import Charted, Parameterization
+from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.surface import (
     BoolArray,
     FloatArray,
+    IntArray,
     Mesh,
-    first_equal,
     flat_faces,
     twin_halfedges,
 )
@@ -77,7 +77,7 @@ def quality(placed: Charted, texture: int) -> Quality:
         placed: the mesh and its map; faces without area take no part but in the charts.
         texture: texels along a side of the square.
     """
-    placed = _welded(placed)
+    placed = placed.welded()
     mesh, held = placed
     solid = ~flat_faces(mesh.vertices, mesh.faces)
     space = mesh.vertices[mesh.faces[solid]]
@@ -95,7 +95,7 @@ def quality(placed: Charted, texture: int) -> Quality:
     whole = np.zeros((2, len(mesh.faces)))
     whole[:, solid] = share, ratio * share
     flipped = int((signed <= 0).sum())
-    overlap = "unknown" if flipped else _overlap(held)
+    overlap = "unknown" if flipped else _overlap(held.uv, held.corners[solid])
     filled = float(np.abs(signed).sum())
     if overlap != "none":
         filled = texels(placed, FINE).inside.sum() / FINE**2
@@ -115,28 +115,18 @@ def quality(placed: Charted, texture: int) -> Quality:
     )
 
 
-def _welded(placed: Charted) -> Charted:
-    """The mesh welded, and its map with one row for all corners at one vertex and one uv."""
-    whole, held = placed.mesh.welded, placed.map
-    if np.array_equal(whole.faces, placed.mesh.faces):
-        return placed
-    uv = held.uv[held.corners.reshape(-1)]
-    row = first_equal(np.column_stack([whole.faces.reshape(-1), uv]))
-    return Charted(whole, Parameterization(uv, row.reshape(-1, 3)))
-
-
-def _overlap(held: Parameterization) -> str:
-    """Whether faces of a map without flips lie on others: "none", "some" or "unknown".
+def _overlap(uv: FloatArray, corners: IntArray) -> str:
+    """Whether faces (F, 3) of a map (T, 2) without flips lie on others: "none", "some", "unknown".
 
     Where the boundaries of the charts cross or touch nothing, what they enclose by turns, inside
     and outside, is the area of all faces, unless a chart lies within another.
     """
-    flat = Mesh(np.pad(held.uv, ((0, 0), (0, 1))), held.corners)
+    flat = Mesh(np.pad(uv, ((0, 0), (0, 1))), corners)
     if not (flat.is_manifold and flat.is_oriented):
         return "unknown"
-    if len(crossing_vertices(flat, held.uv)):
+    if len(crossing_vertices(flat, uv)):
         return "some"
-    rings = [held.uv[np.append(loop, loop[0])] for loop in flat.boundary_loops]
+    rings = [uv[np.append(loop, loop[0])] for loop in flat.boundary_loops]
     doubled = flat.face_areas.sum() - shapely.build_area(shapely.MultiLineString(rings)).area
     return "some" if doubled > DOUBLED * flat.face_areas.sum() else "none"
 

@@ -125,6 +125,8 @@ class Unwrap:
     def unwrapped(self, mesh: Mesh, *, seed: int = 0) -> Parameterization:
         """The map of any mesh: each component by itself, the time budget shared by their faces.
 
+        Vertices at one place count as one, so that no seam of an older map is left in the mesh.
+
         Args:
             mesh: what is no manifold or oriented is opened (`parapoint.surfaces.preparation`).
             seed: of every random draw.
@@ -133,7 +135,7 @@ class Unwrap:
             UnsupportedError: no face has an area.
             FlatteningError: no start without flips was found.
         """
-        preparation = prepared(mesh, self.requires)
+        preparation = prepared(mesh.welded, self.requires)
         maps = preparation.maps(self, seed)
         joined = preparation.joined(maps)
         assert isinstance(joined, Parameterization)

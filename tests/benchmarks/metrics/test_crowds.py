@@ -9,8 +9,8 @@ from benchmarks.metrics.boxes import Hierarchy
 from benchmarks.metrics.crowds import Crowd
 from benchmarks.metrics.evaluation import evaluate, evaluate_points
 from benchmarks.metrics.state import MapState
-from benchmarks.metrics.welding import places
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization
+from parapoint.surfaces.places import places
 from parapoint.surfaces.surface import Mesh, PointCloud
 
 COUNT = 3000

@@ -5,8 +5,8 @@ from numpy.testing import assert_allclose
 from benchmarks.cases.builtin import grid_faces
 from benchmarks.metrics.evaluation import evaluate
 from benchmarks.metrics.state import MapState
-from benchmarks.metrics.welding import places
 from parapoint import Mesh, Parameterization
+from parapoint.surfaces.places import places
 from parapoint.testing import sphere
 
 

@@ -218,3 +218,21 @@ def test_a_large_mesh_that_cannot_be_simplified_is_brought_down_from_both_starts
     assert settled == [len(mesh.faces)] * 2
     best = min(runs, key=lambda run: run.energy + seam_of(run, mesh))
     np.testing.assert_array_equal(made.corners, best.mesh.faces)
+
+
+@pytest.mark.parametrize("apart", [0, 1e-16])
+@pytest.mark.parametrize("split", ["meridian", "soup"])
+def test_seams_of_an_older_map_are_not_left_in_the_mesh(split, apart) -> None:
+    """Vertices doubled along an old seam, or at all corners, are unwrapped as the closed ball."""
+    ball = sphere()
+    if split == "soup":
+        vertices, faces = ball.vertices[ball.faces.reshape(-1)], np.arange(ball.faces.size)
+    else:
+        opened = cut_to_disk(ball)
+        vertices, faces = opened.vertices, opened.faces
+    doubled = Mesh(vertices + apart * (np.arange(len(vertices)) % 2)[:, None], faces.reshape(-1, 3))
+    closed = Unwrap().unwrapped(ball)
+    found = Unwrap().unwrapped(doubled)
+    now, before = (evaluate(mesh, of) for mesh, of in ((doubled, found), (ball, closed)))
+    for name in ("seam_length", "symmetric_dirichlet", "chart_count", "bijective"):
+        assert now[name] == pytest.approx(before[name], rel=1e-3), name

@@ -136,6 +136,7 @@ def test_seams_join_the_vertices_that_lie_at_one_place(tmp_path, capsys) -> None
     assert status == 0
     facts = json.loads(out)
     assert (facts["charts"], facts["components"], facts["overlap"]) == (1, 1, "none")
+    assert facts["welded"] == ball.faces.size - len(ball.vertices)
     ends = ball.vertices[[a, b, c]]
     length = np.linalg.norm(np.diff(ends, axis=0), axis=1).sum()
     assert facts["seam"] == pytest.approx(length / np.sqrt(ball.face_areas.sum()), rel=1e-3)
@@ -143,6 +144,46 @@ def test_seams_join_the_vertices_that_lie_at_one_place(tmp_path, capsys) -> None
         line for line in (tmp_path / "out.obj").read_text().splitlines() if line[:2] == "v "
     ]
     assert vertices == (tmp_path / "soup.obj").read_text().splitlines()[: len(vertices)]
+
+
+def test_the_seams_of_a_map_are_followed(box, tmp_path, capsys) -> None:
+    """The box unfolds along its net again, whatever file the map is in and how it is scaled."""
+    unfold(box, tmp_path / "net.obj", capsys)
+    unfold(box, tmp_path / "net.glb", capsys)
+    for kept in ("net.obj", "net.glb"):
+        again = ["unwrap", box, "--out", tmp_path / "again.obj", "--seams", tmp_path / kept]
+        status, out, _ = run([*again, "--json"], capsys)
+        facts = json.loads(out)
+        assert (status, facts["charts"]) == (0, 1)
+        assert facts["stretch_worst"] < 1.001
+        assert facts["seam"] == pytest.approx((6 + 2) / math.sqrt(10), rel=1e-3)
+
+
+def test_a_map_of_another_surface_has_no_seams_for_this_one(box, tmp_path, capsys) -> None:
+    unfold(box, tmp_path / "net.obj", capsys)
+    finer = BOX.replace("v 0 0 0 1 0 0", "v 0 0 9")
+    (tmp_path / "other.obj").write_text(finer)
+    seams = ["--seams", tmp_path / "net.obj"]
+    status, _, err = run(
+        ["unwrap", tmp_path / "other.obj", "--out", tmp_path / "a.obj", *seams], capsys
+    )
+    assert status == 2
+    assert "net.obj: has a seam near [" in err
+    assert err.count("\n") == 1
+    status, _, err = run(["unwrap", box, "--out", tmp_path / "a.obj", "--seams", box], capsys)
+    assert status == 2
+    assert "have no UV; each must have one" in err
+    assert not (tmp_path / "a.obj").exists()
+
+
+def test_the_file_of_seams_is_not_replaced(box, tmp_path, capsys) -> None:
+    unfold(box, tmp_path / "net.obj", capsys)
+    before = (tmp_path / "net.obj").read_text()
+    seams = ["--seams", tmp_path / "net.obj"]
+    status, _, err = run(["unwrap", box, "--out", tmp_path / "net.obj", *seams], capsys)
+    assert status == 2
+    assert "net.obj: is the input, which is not replaced" in err
+    assert (tmp_path / "net.obj").read_text() == before
 
 
 def test_the_largest_component_is_found_across_split_vertices(tmp_path, capsys) -> None:
