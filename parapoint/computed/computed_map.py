@@ -165,7 +165,8 @@ def _rows_of(missing: FloatArray, frame: Frame, surface: Surface) -> str:
     """The rows of a cloud in which these points (n, 3) of the frame are, for a message."""
     if not isinstance(surface, PointCloud):
         return ""
-    rows = np.unique(cKDTree(surface.points).query(frame.outside(missing))[1])
+    nearest = cKDTree(surface.points).query(frame.outside(missing))[1]
+    rows = surface.rows_of(np.unique(nearest))
     return f": row{'s' * (len(rows) > 1)} {named(rows)}"
 
 

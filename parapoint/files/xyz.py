@@ -39,6 +39,8 @@ SPELLED = {
     "\N{THIN SPACE}".encode(): b" ",
 }
 """Signs that word processors write, and the plain ones that they stand for."""
+MISSING = re.compile(rb"(?<![^\s,;|])(?:(?<=[\t,;|])#)?(?:n/?a|null|none)(?![^\s,;|])", re.I)
+"""How R, Excel, SQL and Python write a value that is missing."""
 QUOTED = re.compile(
     rb'(?:^|(?<=[\s,;|]))"([^"\n]*[^"\n\d+\-.,eE][^"\n]*)"(?=[\s,;|]|$)', re.MULTILINE
 )
@@ -73,6 +75,8 @@ def text_lines(data: bytes) -> list[bytes]:
 def _all_lines(data: bytes) -> list[bytes]:
     """The lines of a text, with signs and numbers spelled as most programs spell them.
 
+    A missing value is nan in lines that hold a number or three missing ones.
+
     Raises:
         InputError: a space that is not plain stands between digits.
     """
@@ -85,7 +89,15 @@ def _all_lines(data: bytes) -> list[bytes]:
                     "write plain blanks between the numbers, and none inside them"
                 )
             data = data.replace(sign, plain)
-    return data.splitlines()
+    lines = data.splitlines()
+    if not MISSING.search(data):
+        return lines
+    return [
+        MISSING.sub(b"nan", line)
+        if re.search(rb"\d", line) or len(MISSING.findall(line)) >= 3
+        else line
+        for line in lines
+    ]
 
 
 def _kept(lines: list[bytes]) -> list[bytes]:
@@ -248,11 +260,24 @@ def _refuse_ptx(lines: list[bytes]) -> None:
 def xyz(data: bytes) -> Content:
     """Text with x y z in each line, and whatever columns a scanner adds; see `_further_columns`.
 
+    A count may stand before the rows.
+
     Raises:
-        InputError: there is no point, it cannot be told which columns are x, y and z, one of them
-            is no number in some line, or it is PTX; see `_all_lines` and `_blank_parted`.
+        InputError: there is no point, or fewer than the count says; it cannot be told which columns
+            are x, y and z, one of them is no number in some line, or it is PTX; see `_all_lines`
+            and `_blank_parted`.
     """
-    return _cloud(_all_lines(data))
+    lines = _all_lines(data)
+    content = _cloud(lines)
+    kept = _kept(lines)
+    counts = [int(line) for line in kept if line.strip().isdigit()]
+    if len(counts) == 1 and kept[0].strip().isdigit():
+        announced, found = counts[0], len(content.vertices)
+        if announced > found:
+            raise InputError(f"ends early: {announced} points are announced, {found} are there")
+        if announced < found:
+            logger.warning("%d points are announced, but %d are there", announced, found)
+    return content
 
 
 def _cloud(lines: list[bytes]) -> Content:

@@ -242,6 +242,19 @@ def test_las_without_a_scale_is_refused(axis, scale, tmp_path) -> None:
             read_all(tmp_path / "a.las")
 
 
+@pytest.mark.parametrize(("announced", "is_said"), [(4, False), (3, True)])
+def test_las_with_more_points_than_announced_says_so(announced, is_said, tmp_path, caplog) -> None:
+    file = laspy.create(point_format=2, file_version="1.2")
+    file.x, file.y, file.z = POINTS.T
+    file.write(tmp_path / "a.las")
+    data = bytearray((tmp_path / "a.las").read_bytes())
+    struct.pack_into("<I", data, 107, announced)
+    (tmp_path / "a.las").write_bytes(data)
+    assert len(read_surface(tmp_path / "a.las").points) == announced
+    said = "3 points are announced, but the file has room for 4" in caplog.text
+    assert said is is_said
+
+
 def test_las_without_colours_has_none(tmp_path) -> None:
     file = laspy.create(point_format=2, file_version="1.2")
     file.x, file.y, file.z = POINTS.T

@@ -103,6 +103,43 @@ def test_empty_cells_are_missing_values(
     assert f"{3 - blank} of {6 - blank} points dropped" in caplog.text
 
 
+@pytest.mark.parametrize("missing", ["NA", "na", "N/A", "null", "None", "#N/A", "nan"])
+@pytest.mark.parametrize("mark", [",", ";", "\t"])
+def test_words_for_missing_values(tmp_path: Path, missing: str, mark: str) -> None:
+    """As R, Excel, SQL and Python write them, in coordinates and in other columns."""
+    rows = ["x,y,z,i", f"1.5,2.25,-3,{missing}", f"9,{missing},9,9", "4,5.5,6,7"]
+    cloud = cloud_of(tmp_path, "\n".join(rows).replace(",", mark))
+    assert_array_equal(cloud.points, POINTS)
+    assert_array_equal(cloud.attributes["intensity"], [np.nan, 7])
+    assert cloud.dropped == 1
+
+
+@pytest.mark.parametrize("text", ["NA NA NA\n{}", "{}NA NA NA\n", "NA 1 2\n{}", "1 NA 2 3\n{}"])
+def test_rows_without_a_heading_may_lack_values(tmp_path: Path, text: str) -> None:
+    cloud = cloud_of(tmp_path, text.format("1.5 2.25 -3\n4 5.5 6\n"))
+    assert_array_equal(cloud.points, POINTS)
+    assert cloud.dropped == 1
+
+
+@pytest.mark.parametrize("title", ["none", "NA", "# null 2024", "site None"])
+def test_a_title_is_no_missing_value(tmp_path: Path, title: str) -> None:
+    assert_array_equal(cloud_of(tmp_path, f"{title}\n1.5 2.25 -3\n4 5.5 6\n").points, POINTS)
+
+
+@pytest.mark.parametrize("head", ["{}\n", "# by hand\n{}\n", "{}\nx y z\n"])
+def test_the_count_of_a_text_is_held_to(
+    tmp_path: Path, head: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Fewer points than it says are a file that was cut off; more are read, and said."""
+    rows = "1.5 2.25 -3\n4 5.5 6\n"
+    assert_array_equal(cloud_of(tmp_path, head.format(2) + rows).points, POINTS)
+    assert "announced" not in caplog.text
+    assert_array_equal(cloud_of(tmp_path, head.format(1) + rows).points, POINTS)
+    assert "1 points are announced, but 2 are there" in caplog.text
+    with pytest.raises(InputError, match="ends early: 3 points are announced, 2 are there"):
+        cloud_of(tmp_path, head.format(3) + rows)
+
+
 def test_columns_that_are_empty_throughout_are_none(tmp_path: Path) -> None:
     """As spreadsheets write them behind the last one."""
     for text in ("1.5,2.25,-3,,\n4,5.5,6,,\n", "x,y,z,,\n1.5,2.25,-3,,\n4,5.5,6,,\n"):
