@@ -39,7 +39,9 @@ SPELLED = {
     "\N{THIN SPACE}".encode(): b" ",
 }
 """Signs that word processors write, and the plain ones that they stand for."""
-MISSING = re.compile(rb"(?<![^\s,;|])(?:(?<=[\t,;|])#)?(?:n/?a|null|none)(?![^\s,;|])", re.I)
+MISSING = re.compile(
+    rb"(?<![^\s,;|])(?:(?<=[\t,;|])#)?(?:n/?a|null|none)(?![^\s,;|])", re.IGNORECASE
+)
 """How R, Excel, SQL and Python write a value that is missing."""
 QUOTED = re.compile(
     rb'(?:^|(?<=[\s,;|]))"([^"\n]*[^"\n\d+\-.,eE][^"\n]*)"(?=[\s,;|]|$)', re.MULTILINE
