@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
+from scipy.spatial import cKDTree
 
 from parapoint import ComputedMap, PointCloud
 from parapoint.surfaces.strays import far_from, stray_points
@@ -228,6 +229,43 @@ def rings(gap: float) -> FloatArray:
     return np.column_stack(
         [np.sin(slope) * np.cos(turn), np.sin(slope) * np.sin(turn), np.cos(slope)]
     )
+
+
+def in_a_box(points: FloatArray, share: float, seed: int = 1) -> FloatArray:
+    """Noise all through a box a little larger than the points'."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    at = np.random.default_rng(seed).random((round(share * len(points)), 3))
+    return (low + high) / 2 + 1.1 * (at - 0.5) * (high - low)
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1e6])
+@pytest.mark.parametrize(
+    ("surface", "share"),
+    [(dome, 0.005), (dome, 0.03), (dome, 0.08), (box, 0.01), (box, 0.03), (tube, 0.03)],
+)
+def test_noise_strewn_through_space(
+    surface: Callable[[int], FloatArray], share: float, unit: float
+) -> None:
+    """It is found where it is farther off the surface than the points of this from each other."""
+    points = surface(5000)
+    noise = in_a_box(points, share)
+    off = cKDTree(points).query(noise)[0] / np.median(cKDTree(points).query(points, [7])[0])
+    found = stray_points(unit * (np.concatenate([points, noise]) + 7))
+    assert not found[:5000].any()
+    assert found[5000:][off > 3.5].mean() > 0.9
+    assert not found[5000:][off < 2].any()
+
+
+def test_noise_inside_a_dome_does_not_close_it() -> None:
+    """One point amid the open side would let triangles as large as that side be taken."""
+    points = dome(3000)
+    found = ComputedMap().parameterize(
+        PointCloud(np.concatenate([points, in_a_box(points, 0.01)])), seed=0
+    )
+    facts = found.report["found"]
+    assert isinstance(facts, dict)
+    assert facts["seam_edges"] == 0
+    assert np.isfinite(found.uv[:3000]).all()
 
 
 @pytest.mark.parametrize(
