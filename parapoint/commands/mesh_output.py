@@ -10,7 +10,7 @@ from pathlib import Path
 from parapoint.commands.output import SIDES, TEXTURE
 from parapoint.commands.progress import Tell, baking, untold
 from parapoint.files.gltf import opened
-from parapoint.files.gltf_rewriting import check_rewritable, rewrite_gltf
+from parapoint.files.gltf_rewriting import check_rewritable, has_colours, rewrite_gltf
 from parapoint.files.materials import libraries, material_names
 from parapoint.files.mesh_writers import (
     write_material,
@@ -100,7 +100,11 @@ class MeshOutput:
             with faults_of(self.source):
                 check_rewritable(self.source)
         if self.asked and not self._gets_texture:
-            why = "its own materials stay" if self.is_rewritten else "this format has none"
+            why = (
+                "its own colours and materials stay"
+                if self.is_rewritten
+                else "this format has none"
+            )
             logger.warning("%s: no texture is written: %s", self.out, why)
 
     @property
@@ -108,7 +112,10 @@ class MeshOutput:
         """Whether a texture of ours is written, beside the file or inside."""
         if self.out.suffix.lower() != ".glb":
             return self.has_picture
-        return not (self.is_rewritten and opened(self.source).tree.get("materials"))
+        if not self.is_rewritten:
+            return True
+        tree = opened(self.source).tree
+        return not (tree.get("materials") or has_colours(tree))
 
     def picture(self, placed: Charted, tell: Tell = untold) -> Picture:
         """What the texture shows: what the file does, or a checkerboard."""

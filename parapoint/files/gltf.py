@@ -10,7 +10,6 @@ import json
 import logging
 import struct
 from collections.abc import Callable
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import unquote
@@ -25,11 +24,11 @@ from parapoint.files.content import (
     NO_UV,
     Content,
     points_content,
-    strip_triangles,
     welded,
     whole,
 )
 from parapoint.files.decoding import check_decoded, plain
+from parapoint.files.gltf_primitives import draws_points, draws_triangles, mode_triangles
 from parapoint.surfaces.surface import FloatArray, IntArray
 
 GLTF_TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -77,11 +76,6 @@ def _scene(data: bytes, folder: Path) -> Gltf:
         size, _ = struct.unpack_from("<I4s", tail)
         chunk = tail[8 : 8 + size]
     return Gltf(json.loads(data[20 : 20 + length]), folder, chunk, len(data))
-
-
-def draws_triangles(primitive: dict[str, Any]) -> bool:
-    """Whether a primitive is one of those whose triangles are read, in order."""
-    return "POSITION" in primitive["attributes"] and primitive.get("mode", 4) in {4, 5, 6}
 
 
 class Placed(NamedTuple):
@@ -166,7 +160,7 @@ class Gltf:
             run = whole(self.accessor(primitive["indices"])).reshape(-1)
         else:
             run = np.arange(self.tree["accessors"][primitive["attributes"]["POSITION"]]["count"])
-        return _mode_triangles(primitive.get("mode", 4), run)
+        return mode_triangles(primitive.get("mode", 4), run)
 
     def accessor(self, index: int) -> FloatArray | IntArray:
         """(n, width) values; normalized whole numbers become fractions."""
@@ -321,12 +315,13 @@ class Gltf:
 
     def content(self) -> Content:
         """The scene as one content."""
-        positions, corners, uvs, uv_corners = [], [], [], []
+        positions, colours, corners, uvs, uv_corners = [], [], [], [], []
         vertex_count = uv_count = decoded = 0
         placed_primitives = self.placed_primitives()
         if not any(draws_triangles(placed.primitive) for placed in placed_primitives):
             return self._points(placed_primitives)
-        for placed in _told(placed_primitives, draws_triangles):
+        read = _told(placed_primitives, draws_triangles)
+        for placed in read:
             primitive, transform = placed.primitive, placed.transform
             attributes = primitive["attributes"]
             place = self._positions(placed)
@@ -339,6 +334,7 @@ class Gltf:
             if len(triangles) and (triangles.min() < 0 or triangles.max() >= len(place)):
                 raise InputError(f"a vertex index is out of range (0 to {len(place) - 1})")
             positions.append(place)
+            colours.append(self._colours(primitive, len(place)))
             corners.append(triangles + vertex_count)
             vertex_count += len(place)
             uv_set, uv_transform = self._texture(primitive)
@@ -352,9 +348,13 @@ class Gltf:
                 uv_count += len(uv)
             else:
                 uv_corners.append(np.full(len(triangles), NO_UV))
-        vertices, row = welded(np.concatenate(positions))
+        attributes = _vertex_colours(read, colours)
+        # Vertices at one place are one if they have one colour, too.
+        vertices, row = welded(np.column_stack([np.concatenate(positions), *attributes.values()]))
         flat = np.concatenate(corners)
-        content = Content(vertices, np.full(len(flat) // 3, 3), row[flat])
+        content = Content(vertices[:, :3], np.full(len(flat) // 3, 3), row[flat])
+        if attributes:
+            content.attributes["colours"] = vertices[:, 3:].astype(np.float32)
         if uvs:
             content.uv, content.uv_corners = np.concatenate(uvs), np.concatenate(uv_corners)
         return content
@@ -362,7 +362,8 @@ class Gltf:
     def _points(self, placed_primitives: list[Placed]) -> Content:
         """The points of a scene without triangles, with their colours if some have any."""
         points, colours, decoded = [], [], 0
-        for placed in _told(placed_primitives, _draws_points):
+        read = _told(placed_primitives, draws_points)
+        for placed in read:
             primitive = placed.primitive
             place = self._positions(placed)
             rows = np.arange(len(place))
@@ -377,10 +378,7 @@ class Gltf:
             colours.append(colour[rows])
         if not points:
             raise InputError("has no triangle and no point")
-        attributes = {}
-        if any("COLOR_0" in placed.primitive["attributes"] for placed in placed_primitives):
-            parts = np.concatenate(colours)
-            attributes["colours"] = parts if (parts[:, 3] < 1).any() else parts[:, :3]
+        attributes = _vertex_colours(read, colours)
         return points_content(np.concatenate(points), attributes=attributes)
 
     def _colours(self, primitive: dict[str, Any], count: int) -> npt.NDArray[np.float32]:
@@ -400,8 +398,14 @@ class Gltf:
         return colours.astype(np.float32)
 
 
-def _draws_points(primitive: dict[str, Any]) -> bool:
-    return "POSITION" in primitive["attributes"] and primitive.get("mode", 4) == 0
+def _vertex_colours(
+    placed: list[Placed], colours: list[npt.NDArray[np.float32]]
+) -> dict[str, npt.NDArray[np.float32]]:
+    """The (count, 4) colours of each primitive as one attribute, if any gives its vertices some."""
+    if not any("COLOR_0" in one.primitive["attributes"] for one in placed):
+        return {}
+    parts = np.concatenate(colours)
+    return {"colours": parts if (parts[:, 3] < 1).any() else parts[:, :3]}
 
 
 def _told(placed: list[Placed], is_read: Callable[[dict[str, Any]], bool]) -> list[Placed]:
@@ -436,12 +440,3 @@ def _node_transform(node: dict[str, Any]) -> FloatArray:
     transform[:3, :3] = Rotation.from_quat(turn).as_matrix() * stretch
     transform[:3, 3] = shift
     return transform
-
-
-def _mode_triangles(mode: int, run: IntArray) -> IntArray:
-    """(F, 3) triangles of a glTF primitive: mode 4 a list, 5 a strip, 6 a fan."""
-    if mode == 4:
-        return run.reshape(-1, 3)
-    if mode == 5:
-        return strip_triangles(np.array([len(run)]), run)
-    return np.array([(run[0], *pair) for pair in pairwise(run[1:])], np.int64).reshape(-1, 3)

@@ -13,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from parapoint.errors import InputError
-from parapoint.files.gltf import Gltf, draws_triangles, opened
+from parapoint.files.gltf import Gltf, opened
+from parapoint.files.gltf_primitives import draws_triangles
 from parapoint.files.png import png
 from parapoint.files.targets import complete_file
 from parapoint.surfaces.parameterization import Parameterization
@@ -53,7 +54,8 @@ def rewrite_gltf(
 
     Where a material shows a picture through the file's own UVs, these stay, and the new ones are a
     further set. Otherwise they are the first. Nodes that share a mesh get a mesh each, since each
-    has a place of its own in the map. A file without materials gets one that shows `picture`.
+    has a place of its own in the map. A file without materials gets one that shows `picture`, but
+    where vertices have colours, which would tint it.
 
     Args:
         source: the .glb or .gltf file that was read.
@@ -67,7 +69,7 @@ def rewrite_gltf(
     placed = scene.placed_primitives()
     uv_set = _free_set(tree)
     made = _Made(scene)
-    if not tree.get("materials"):
+    if not (tree.get("materials") or has_colours(tree)):
         made.add_material(picture)
     primitives = []
     begin = 0
@@ -137,6 +139,12 @@ def _has_key(value: Any) -> bool:
     if isinstance(value, dict):
         return not DATA.isdisjoint(value) or any(map(_has_key, value.values()))
     return isinstance(value, list) and any(map(_has_key, value))
+
+
+def has_colours(tree: dict[str, Any]) -> bool:
+    """Whether vertices have colours."""
+    of = (primitive["attributes"] for mesh in tree["meshes"] for primitive in mesh["primitives"])
+    return any("COLOR_0" in attributes for attributes in of)
 
 
 def _free_set(tree: dict[str, Any]) -> str:

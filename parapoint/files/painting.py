@@ -167,7 +167,8 @@ def _ply(path: Path) -> tuple[tuple[Material, ...], IntArray]:
 
 
 def _gltf(path: Path) -> tuple[tuple[Material, ...], IntArray]:
-    from parapoint.files.gltf import draws_triangles, opened
+    from parapoint.files.gltf import opened
+    from parapoint.files.gltf_primitives import draws_triangles
 
     tree = opened(path)
     pictures: dict[int, Picture] = {}

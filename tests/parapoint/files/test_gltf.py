@@ -1,6 +1,7 @@
 """glTF files as scanners, viewers and packers write them, and the arrays that are meant."""
 
 import base64
+import io
 import json
 import struct
 from pathlib import Path
@@ -10,12 +11,13 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from PIL import Image
 
 from parapoint import InputError, Mesh, PointCloud
 from parapoint.files.attributes import unit_colours
 from parapoint.files.gltf import opened
 from parapoint.files.gltf_rewriting import rewrite_gltf
-from parapoint.files.reading import FORMATS, read_polygons, read_surface
+from parapoint.files.reading import FORMATS, Polygons, read_polygons, read_surface
 from parapoint.surfaces.parameterization import Parameterization
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], "<f4")
@@ -73,6 +75,44 @@ def test_points_have_their_colours(tmp_path: Path, width: int, kind: str, normal
     cloud = cloud_of(tmp_path, tree)
     assert_array_equal(cloud.points, SQUARE)
     assert_allclose(np.float64(unit_colours(cloud.attributes["colours"])), SHOWN, atol=0.003)
+
+
+def painted_square(folder: Path, *, has_colours: bool) -> Path:
+    """Two triangles, each in a colour of its own, with four vertices at their common edge."""
+    corners, colours = SQUARE[TRIANGLES], COLOURS[[0, 0, 0, 1, 1, 1]].astype("float32")
+    attributes = {"POSITION": 0, "COLOR_0": 1} if has_colours else {"POSITION": 0}
+    return saved(folder, scene([corners, colours], {"attributes": attributes}))
+
+
+def test_faces_keep_their_own_colours(tmp_path: Path) -> None:
+    """Vertices at one place are one only if they have one colour."""
+    given = read_polygons(painted_square(tmp_path, has_colours=True))
+    assert isinstance(given, Polygons)
+    assert given.colours is not None
+    assert len(given.mesh.vertices) == 6
+    assert_allclose(given.colours[given.mesh.faces][:, :, :3], SHOWN[[[0] * 3, [1] * 3]], atol=3e-3)
+    bare = read_polygons(painted_square(tmp_path, has_colours=False))
+    assert isinstance(bare, Polygons)
+    assert len(bare.mesh.vertices) == 4
+    assert bare.colours is None
+
+
+@pytest.mark.parametrize("has_colours", [True, False])
+def test_a_mesh_without_materials_gets_one_unless_it_has_colours(
+    tmp_path: Path, has_colours: bool
+) -> None:
+    """They would tint its picture."""
+    source, out = painted_square(tmp_path, has_colours=has_colours), tmp_path / "out.glb"
+    uv = np.random.default_rng(0).random((6, 2))
+    grey = np.full((8, 8, 3), 127, np.uint8)
+    rewrite_gltf(source, out, Parameterization(uv, np.arange(6).reshape(2, 3)), grey)
+    written = opened(out)
+    (primitive,) = written.tree["meshes"][0]["primitives"]
+    assert ("material" in primitive) is not has_colours
+    assert ("COLOR_0" in primitive["attributes"]) is has_colours
+    if not has_colours:
+        with Image.open(io.BytesIO(written.image(0))) as image:
+            assert_array_equal(np.asarray(image), grey)
 
 
 def test_points_without_colours_have_that_of_their_material(tmp_path: Path) -> None:

@@ -250,7 +250,7 @@ def test_of_the_uvs_of_a_vertex_one_is_chosen_and_without_any_the_middle() -> No
 
 def test_a_texture_that_an_obj_file_has_no_use_for_is_said(box, tmp_path, capsys, caplog) -> None:
     unfold(box, tmp_path / "out.obj", capsys, "--texture", 64)
-    assert "no texture is written: its own materials stay" in caplog.text
+    assert "no texture is written: its own colours and materials stay" in caplog.text
     assert not (tmp_path / "out.png").exists()
 
 
