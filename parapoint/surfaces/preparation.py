@@ -28,7 +28,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
-import igl
 import numpy as np
 
 from parapoint import clock
@@ -43,6 +42,7 @@ from parapoint.surfaces.surface import (
     PointCloud,
     Surface,
     flat_faces,
+    turned_faces,
 )
 
 IMPLIED = {
@@ -201,7 +201,7 @@ def _repaired(mesh: Mesh, words: frozenset[str]) -> tuple[list[Mesh], list[str],
         note(len(copied), "split", "non-manifold vertex", "non-manifold vertices")
         made = fans
     if "oriented" in words:
-        turned = _turned(made)
+        turned = turned_faces(made.faces)
         note(int(turned.sum()), "turned", "face")
         place = np.where(turned[:, None], place[:, ::-1], place)
         made = Mesh(made.vertices, np.where(turned[:, None], made.faces[:, ::-1], made.faces))
@@ -254,14 +254,6 @@ def _with_flipped_edges(mesh: Mesh) -> tuple[IntArray, int]:
             return made.faces.copy(), flips
         flips += int(changed.sum()) // 2
     return faces, flips
-
-
-def _turned(mesh: Mesh) -> BoolArray:
-    """(F,) the faces to turn so that neighbours turn alike: the fewer ones of each component."""
-    faces, patch = igl.bfs_orient(mesh.faces)
-    turned = (faces != mesh.faces).any(axis=1)
-    most = 2 * np.bincount(patch, turned) > np.bincount(patch)
-    return np.asarray(turned ^ most[patch], dtype=bool)
 
 
 def _compact(vertices: FloatArray, faces: IntArray) -> Mesh:

@@ -112,6 +112,14 @@ def edge_components(triangles: IntArray) -> IntArray:
     return np.asarray(label, dtype=np.int64)
 
 
+def turned_faces(triangles: IntArray) -> BoolArray:
+    """(F,) the triangles to turn so that neighbours turn alike: the fewer of each component."""
+    turned, patch = igl.bfs_orient(triangles)
+    is_turned = (turned != triangles).any(axis=1)
+    most = 2 * np.bincount(patch, is_turned) > np.bincount(patch)
+    return np.asarray(is_turned ^ most[patch], dtype=bool)
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """A triangle mesh.

@@ -18,6 +18,7 @@ from parapoint.surfaces.surface import (
     IntArray,
     Mesh,
     flat_faces,
+    turned_faces,
     twin_halfedges,
 )
 from parapoint.textures.texels import texels
@@ -81,8 +82,10 @@ def quality(placed: Charted, texture: int) -> Quality:
     mesh, held = placed
     solid = ~flat_faces(mesh.vertices, mesh.faces)
     space = mesh.vertices[mesh.faces[solid]]
-    plane = np.pad(held.uv[held.corners[solid]], ((0, 0), (0, 0), (0, 1)))
-    area, signed = _normals(space), _normals(plane)[:, 2] / 2
+    corners = held.corners[solid]
+    plane = np.pad(held.uv[corners], ((0, 0), (0, 0), (0, 1)))
+    is_turned = turned_faces(corners)  # against its neighbours, in the mesh as in the map
+    area, signed = _normals(space), _normals(plane)[:, 2] / 2 * np.where(is_turned, -1, 1)
     area = np.linalg.norm(area, axis=1) / 2
     ratio = (np.abs(signed) / np.abs(signed).sum()) / (area / area.sum())
     share = area / area.sum()
@@ -95,7 +98,11 @@ def quality(placed: Charted, texture: int) -> Quality:
     whole = np.zeros((2, len(mesh.faces)))
     whole[:, solid] = share, ratio * share
     flipped = int((signed <= 0).sum())
-    overlap = "unknown" if flipped else _overlap(held.uv, held.corners[solid])
+    overlap = (
+        "unknown"
+        if flipped
+        else _overlap(held.uv, np.where(is_turned[:, None], corners[:, ::-1], corners))
+    )
     filled = float(np.abs(signed).sum())
     if overlap != "none":
         filled = texels(placed, FINE).inside.sum() / FINE**2

@@ -5,10 +5,11 @@ import pytest
 
 from parapoint import Mesh, Parameterization
 from parapoint.surfaces.parameterization import Charted
-from parapoint.testing import sphere
+from parapoint.testing import irregular_disk, sphere
 from parapoint.textures.packing import packed
 from parapoint.unwrapping.given import mended_along
 from parapoint.unwrapping.quality import quality
+from parapoint.unwrapping.unwrap import Unwrap
 
 
 def test_quality_by_hand() -> None:
@@ -34,6 +35,34 @@ def test_quality_by_hand() -> None:
     assert quality(Charted(mesh, sheared), 1).charts == 1
     mirrored = Parameterization([[0, 0], [-1, 0], [-1, 1], [0, 1]], mesh.faces)
     assert quality(Charted(mesh, mirrored), 1).flipped == 2
+
+
+def moebius(around: int = 40, across: int = 4) -> Mesh:
+    """A strip whose ends are joined upside down."""
+    turn, off = np.meshgrid(
+        np.arange(around) * 2 * np.pi / around, np.linspace(-0.3, 0.3, across), indexing="ij"
+    )
+    out = 1 + off * np.cos(turn / 2)
+    points = np.stack([out * np.cos(turn), out * np.sin(turn), off * np.sin(turn / 2)], axis=2)
+    row = np.arange(around * across).reshape(around, across)
+    row = np.concatenate([row, row[:1, ::-1]])
+    a, b, c, d = (of.ravel() for of in (row[:-1, :-1], row[1:, :-1], row[1:, 1:], row[:-1, 1:]))
+    return Mesh(points.reshape(-1, 3), np.stack([a, b, c, a, c, d], axis=1).reshape(-1, 3))
+
+
+@pytest.mark.parametrize("made", [moebius, irregular_disk])
+@pytest.mark.parametrize("share", [0, 0.3, 0.5])
+def test_faces_that_turn_against_their_neighbours_are_not_flipped(made, share) -> None:
+    """Their images turn as they do; what is one to one stays so however faces are wound."""
+    mesh = made()
+    turned = np.random.default_rng(0).random(len(mesh.faces)) < share
+    wound = Mesh(mesh.vertices, np.where(turned[:, None], mesh.faces[:, ::-1], mesh.faces))
+    placed = packed(Charted(wound, Unwrap().unwrapped(wound)), 0.01)
+    found = quality(placed, 64)
+    assert (found.flipped, found.overlap, found.charts) == (0, "none", 1)
+    folded = placed.map.uv.copy()
+    folded[placed.map.corners[0]] = folded[placed.map.corners[0]].mean(axis=0)
+    assert quality(Charted(wound, Parameterization(folded, placed.map.corners)), 64).flipped
 
 
 @pytest.mark.parametrize("size", [1, 30])
