@@ -16,6 +16,9 @@ from parapoint.surfaces.surface import IntArray, Mesh
 def read_seams(path: str, mesh: Mesh) -> IntArray:
     """(S, 2) the edges that a text file lists, or the seams of the UV map in a mesh file.
 
+    A line of a text has the numbers of two vertices, counted from 1 as OBJ does. Of several
+    vertices at one place, either end may be any.
+
     Raises:
         InputError: the file cannot be read, or names what is no edge of the mesh.
     """

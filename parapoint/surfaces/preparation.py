@@ -191,7 +191,12 @@ def _repaired(mesh: Mesh, words: frozenset[str]) -> tuple[list[Mesh], list[str],
     note(count, "dropped", "face without area", "faces without area")
     single = _first_of_each(np.sort(faces, axis=1))
     note(int((~single & ~flat).sum()), "dropped", "duplicate face")
-    note(int((~mesh.referenced).sum()), "dropped", "unreferenced vertex", "unreferenced vertices")
+    note(
+        int((~whole.referenced[mesh.place]).sum()),
+        "dropped",
+        "unreferenced vertex",
+        "unreferenced vertices",
+    )
     made = Mesh(whole.vertices, faces[single & ~flat])
     place = made.faces  # welded vertex at each corner, whatever copies the next steps make
     if "manifold" in words:
