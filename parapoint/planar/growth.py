@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import sparse
 from scipy.sparse import csgraph
 
 from parapoint.planar.descent import LEAST_ENERGY, Run
+from parapoint.planar.peaks import peaks
 from parapoint.surfaces.areas import LEAST_PART, starved_faces, starved_share
-from parapoint.surfaces.cutting import edge_graph, edge_lengths, path_to
-from parapoint.surfaces.surface import BoolArray, FloatArray, Mesh
+from parapoint.surfaces.cutting import cut_along, edge_graph, edge_lengths, path_to
+from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
 
 PRICE = 1.0
 """What the symmetric Dirichlet energy (4 at least) must fall by for each sqrt(area) of seam, unless
@@ -53,12 +56,10 @@ class Need:
         """Whether any branch could be worth its length."""
         return self.price < np.inf or self.of(run)
 
-    def least(self, run: Run, length: float) -> float:
-        """What the energy must fall by for a branch of a length in the unit of the mesh."""
-        paid = self.price * length / run.unit
-        if self.of(run):
-            return min(paid, LEAST_FALL * (run.energy - LEAST_ENERGY))
-        return paid
+    def toll(self, run: Run, branches: int = 1) -> Callable[[float], float]:
+        """What the energy must fall by for branches of any length in all, in the mesh's unit."""
+        enough = branches * LEAST_FALL * (run.energy - LEAST_ENERGY) if self.of(run) else np.inf
+        return lambda length: min(self.price * length / run.unit, enough)
 
 
 def grown(run: Run, need: Need) -> Run:
@@ -66,27 +67,34 @@ def grown(run: Run, need: Need) -> Run:
 
     A branch stays where it pays, or where more seam is needed and it brings anything. Branches are
     sought on a free map, where one that fails costs a few steps; a map along them that is one to
-    one is then begun anew, and stays if they pay together. Where they bring the energy below its
-    bound, the last is made as short as that allows. Where more seam is needed still, branches of
-    the map that is one to one open one by one, in many more steps.
+    one is then begun anew, and stays if they pay together. Where no single one pays, as on an
+    urchin with many spikes, branches to all parts that stand out are tried at once. Where branches
+    bring the energy below its bound, the last is made as short as that allows. Where more seam is
+    needed still, branches of the map that is one to one open one by one, in many more steps.
 
     Args:
         run: the map, settled; it is left as it is.
         need: what the seam is to bring.
     """
     while need.may_grow(run) and not run.is_late:
-        free = _led_on(run.freed(), need)
-        longer = free.held(run.deadline) if free.branches > run.branches else None
+        longer = _paid(run, _led_on(run.freed(), need), need)
+        longer = longer or _paid(run, _branched(run, need), need)
         if longer is None:
             break
-        added = (free.rim - run.rim) / 2
-        if not run.energy - longer.energy > need.least(run, added):
-            break
         run = longer
-        shorter = _shortened(free, need)
-        if shorter is not free and (held := shorter.held(run.deadline)) and not need.of(held):
-            run = held
     return _led_on(run, need) if need.of(run) else run
+
+
+def _paid(run: Run, branched: Run, need: Need) -> Run | None:
+    """A map along the branches that a run was given, one to one; None where they do not pay."""
+    branches, added = branched.branches - run.branches, (branched.rim - run.rim) / 2
+    longer = branched.held(run.deadline) if branches else None
+    if longer is None or not run.energy - longer.energy > need.toll(run, branches)(added):
+        return None
+    shorter = _shortened(branched, need)
+    if shorter is not branched and (held := shorter.held(run.deadline)) and not need.of(held):
+        return held
+    return longer
 
 
 def _led_on(run: Run, need: Need) -> Run:
@@ -102,21 +110,18 @@ def _led_on(run: Run, need: Need) -> Run:
 def _longer(run: Run, need: Need) -> Run | None:
     """The map with one more branch; None where none is found."""
     graph = edge_graph(run.mesh, edge_lengths(run.mesh))
-    rim = np.concatenate(run.mesh.boundary_loops)
-    distance, previous, _ = csgraph.dijkstra(
-        graph, indices=rim, return_predecessors=True, min_only=True
-    )
-    area = run.mesh.face_areas
-    excess = area / area.sum() * (run.densities() - LEAST_ENERGY)
+    distance, previous = _ways(graph, np.concatenate(run.mesh.boundary_loops))
+    excess = _excess(run)
     worth = _mean_around(run.mesh, excess) * distance
     if need.is_starved(run):
         worth *= _corners(run.mesh, starved_faces(run.mesh, run.uv))
+    toll = need.toll(run)
     for _ in range(TRIALS_IN_NEED if need.of(run) else TRIALS):
         while True:
             tip = int(worth.argmax())
             if worth[tip] <= 0 or run.is_late:
                 return None
-            least = need.least(run, float(distance[tip]))
+            least = toll(float(distance[tip]))
             near = csgraph.dijkstra(graph, indices=tip, limit=float(distance[tip]))
             worth[near < float(distance[tip]) / 2] = 0
             # No branch could gain more than all of the excess around.
@@ -128,6 +133,53 @@ def _longer(run: Run, need: Need) -> Run | None:
             longer.grown_from = run, path
             return longer
     return None
+
+
+def _branched(run: Run, need: Need) -> Run:
+    """The run cut to the parts that stand out and could pay together, its map not yet begun.
+
+    A branch to one of many spikes hardly changes the energy of all, and pays for the way there
+    alone. Together they share that way: the next branch leads to where most is left of what a part
+    can bring, less its length from the seam and the branches so far, and the best sum ends them.
+    It is the same run where fewer than two are found, as single ones are tried in `_longer`.
+    """
+    graph = edge_graph(run.mesh, edge_lengths(run.mesh))
+    seam = np.concatenate(run.mesh.boundary_loops)
+    toll = need.toll(run)
+    distance, previous = _ways(graph, seam)
+    prizes = peaks(run.mesh, graph, distance, _excess(run), toll)
+    tips: list[int] = []
+    paths: list[IntArray] = []
+    sums: list[float] = []
+    while prizes := {tip: prize for tip, prize in prizes.items() if distance[tip] > 0}:
+        gains = {tip: prize - toll(float(distance[tip])) for tip, prize in prizes.items()}
+        tip = max(gains, key=gains.__getitem__)
+        path = np.array(path_to(previous, tip))
+        tips.append(tip)
+        paths.append(np.stack([path[:-1], path[1:]], axis=1))
+        sums.append(gains[tip])
+        seam = np.union1d(seam, path)
+        distance, previous = _ways(graph, seam)
+    count = int(np.argmax(np.cumsum([0.0, *sums])))
+    if count < 2:
+        return run
+    longer = Run(cut_along(run.mesh, np.concatenate(paths[:count])), run.deadline)
+    longer.tips = (*run.tips, *tips[:count])
+    return longer
+
+
+def _ways(graph: sparse.csr_matrix, seam: IntArray) -> tuple[FloatArray, IntArray]:
+    """(V,) each vertex's distance from the nearest vertex of the seam, and the next on the way."""
+    distance, previous, _ = csgraph.dijkstra(
+        graph, indices=seam, return_predecessors=True, min_only=True
+    )
+    return distance, previous
+
+
+def _excess(run: Run) -> FloatArray:
+    """(F,) what each face adds to the energy above its least."""
+    area = run.mesh.face_areas
+    return np.asarray(area / area.sum() * (run.densities() - LEAST_ENERGY))
 
 
 def _shortened(run: Run, need: Need) -> Run:

@@ -12,7 +12,9 @@ from parapoint.planar.coarse import joined, led, simplified
 from parapoint.planar.descent import Run
 from parapoint.planar.domains import FlatteningError
 from parapoint.planar.growth import Need, grown
+from parapoint.surfaces.cutting import cut_to_disk
 from parapoint.surfaces.parameterization import Parameterization
+from parapoint.surfaces.surface import Mesh
 
 
 @pytest.fixture
@@ -57,6 +59,17 @@ def test_the_seam_grows_to_where_that_of_the_simplified_mesh_did(few) -> None:
     assert again is not None
     assert again.tips == ()
     assert (again.domain.faces == domain.faces).all()
+
+
+@pytest.mark.usefixtures("few")
+def test_the_seam_leads_to_all_spikes_of_the_large_mesh() -> None:
+    ball = builtin.sphere(3)
+    spikes = np.arange(12)
+    out = np.where(np.arange(len(ball.vertices)) < len(spikes), 3.0, 1.0)
+    found = led(cut_to_disk(Mesh(ball.vertices * out[:, None], ball.faces)), Need(), np.inf)
+    assert found is not None
+    assert np.isin(spikes, np.concatenate(found.domain.boundary_loops)).all()
+    assert found.domain.topology == "disk"
 
 
 @pytest.mark.usefixtures("few")
