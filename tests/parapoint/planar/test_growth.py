@@ -93,6 +93,17 @@ def test_branches_are_tried_at_once_where_they_could_pay_together() -> None:
     assert _branched(run, Need(price=100.0)) is run
 
 
+@pytest.mark.parametrize(("price", "count"), [(1.0, 4), (2.5, 2)])
+def test_branches_at_once_lead_to_the_spikes_that_pay(price: float, count: int) -> None:
+    """Six long spikes, of which the automatic cut meets two, and six short ones."""
+    out = np.ones(len(BALL.vertices))
+    out[:6], out[6:12] = 3.0, 1.5
+    run = settled(Mesh(BALL.vertices * out[:, None], BALL.faces))
+    branched = _branched(run, Need(price))
+    assert len(branched.tips) == count
+    assert set(branched.tips) <= set(range(6)) & set(branched.mesh.boundary_loops[0].tolist())
+
+
 @pytest.mark.parametrize("mesh", [BALL, builtin.finger()], ids=["none", "one"])
 def test_fewer_than_two_spikes_are_left_to_single_branches(mesh: Mesh) -> None:
     run = settled(mesh)
