@@ -9,21 +9,21 @@ from pathlib import Path
 
 from parapoint.commands.output import SIDES, TEXTURE
 from parapoint.commands.progress import Tell, baking, untold
-from parapoint.files.gltf import opened
-from parapoint.files.gltf_rewriting import check_rewritable, has_colours, rewrite_gltf
-from parapoint.files.materials import libraries, material_names
-from parapoint.files.mesh_writers import (
+from parapoint.files.meshes.gltf import opened
+from parapoint.files.meshes.materials import libraries, material_names
+from parapoint.files.meshes.painting import Painting, Picture, bare_name, painting_of
+from parapoint.files.reading import Polygons, faults_of
+from parapoint.files.targets import checked_target
+from parapoint.files.writing.gltf_rewriting import check_rewritable, has_colours, rewrite_gltf
+from parapoint.files.writing.mesh_writers import (
     write_material,
     write_npz,
     write_picture,
     write_ply,
     write_textured,
 )
-from parapoint.files.obj_rewriting import rewrite_obj, write_library
-from parapoint.files.painting import Painting, Picture, bare_name, painting_of
-from parapoint.files.ply_rewriting import is_rewritable, rewrite_ply
-from parapoint.files.reading import Polygons, faults_of
-from parapoint.files.targets import checked_target
+from parapoint.files.writing.obj_rewriting import rewrite_obj, write_library
+from parapoint.files.writing.ply_rewriting import is_rewritable, rewrite_ply
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.surface import BoolArray
 from parapoint.textures.baking import LARGEST

@@ -11,9 +11,9 @@ import numpy as np
 from parapoint.commands.progress import Tell, baking, untold
 from parapoint.errors import InputError
 from parapoint.estimator import Estimator
-from parapoint.files.mesh_writers import write_npz, write_ply, write_textured
-from parapoint.files.point_writers import write_points
 from parapoint.files.targets import beside, checked_picture, checked_target
+from parapoint.files.writing.mesh_writers import write_npz, write_ply, write_textured
+from parapoint.files.writing.point_writers import write_points
 from parapoint.fitting import Progress
 from parapoint.surfaces.across_seams import Transform, edges_across_seam, opened
 from parapoint.surfaces.parameterization import Charted

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from parapoint.errors import InputError
+from parapoint.files.clouds.las import las_pieces
 from parapoint.files.content import Content
-from parapoint.files.las import las_pieces
-from parapoint.files.ply import ply_pieces
+from parapoint.files.meshes.ply import ply_pieces
 from parapoint.files.reading import (
     check_fits_together,
     faults_of,

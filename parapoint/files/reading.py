@@ -20,18 +20,18 @@ import numpy as np
 import numpy.typing as npt
 
 from parapoint.errors import InputError
+from parapoint.files.clouds.las import las
+from parapoint.files.clouds.pcd import pcd
+from parapoint.files.clouds.xyz import pts, xyz
 from parapoint.files.content import NO_UV, Content
 from parapoint.files.decoding import plain
-from parapoint.files.gltf import gltf
-from parapoint.files.las import las
+from parapoint.files.meshes.gltf import gltf
+from parapoint.files.meshes.obj import obj
+from parapoint.files.meshes.off import off
+from parapoint.files.meshes.ply import ply
+from parapoint.files.meshes.stl import stl
 from parapoint.files.npz import npz
-from parapoint.files.obj import obj
-from parapoint.files.off import off
-from parapoint.files.pcd import pcd
-from parapoint.files.ply import ply
 from parapoint.files.polygons import triangle_rows
-from parapoint.files.stl import stl
-from parapoint.files.xyz import pts, xyz
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization
 from parapoint.surfaces.surface import (
     BoolArray,

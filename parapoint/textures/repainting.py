@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from parapoint.files.attributes import srgb, unit_colours
-from parapoint.files.painting import WHITE, Painting, Picture
+from parapoint.files.meshes.painting import WHITE, Painting, Picture
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.surface import FloatArray
 from parapoint.textures.baking import MARGIN, Done, dilated, painted, unwatched

@@ -14,8 +14,8 @@ from PIL import Image
 
 from benchmarks.store.rows import ResultRow
 from parapoint.errors import InputError
-from parapoint.files.mesh_writers import write_obj
 from parapoint.files.targets import complete_file, write_text
+from parapoint.files.writing.mesh_writers import write_obj
 from parapoint.sources import source_hash
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh

@@ -68,7 +68,7 @@ DEPENDENCIES = {
     "benchmarks/metrics/overlap.py": "benchmarks.metrics.evaluation",
     "benchmarks/metrics/table.py": "benchmarks.metrics.evaluation",
     "benchmarks/metrics/reference.py": "benchmarks.metrics.evaluation",
-    "parapoint/files/pcd.py": "parapoint.files.reading",
+    "parapoint/files/clouds/pcd.py": "parapoint.files.reading",
     "parapoint/learned/losses.py": "parapoint.learned.parapoint",
     "parapoint/computed/scale.py": "parapoint.unwrapping.unwrap",
     "parapoint/planar/tutte.py": "baselines.disks.slim",

@@ -14,8 +14,8 @@ from rich.progress import Progress as Bar
 from parapoint import ComputedMap, PointCloud, cli
 from parapoint.commands.output import write
 from parapoint.commands.progress import bar
-from parapoint.files.point_writers import write_points
 from parapoint.files.reading import read_parameterized, read_surface
+from parapoint.files.writing.point_writers import write_points
 from parapoint.fitting import Progress
 from parapoint.textures.preview import SIDE
 

@@ -12,7 +12,7 @@ from baselines.tools.atlas import atlas, first_rows, joined_corners, row_numbers
 from baselines.tools.meshlab import matched_faces
 from baselines.tools.optional import Missing, optional
 from parapoint.errors import InputError
-from parapoint.files.mesh_writers import write_textured
+from parapoint.files.writing.mesh_writers import write_textured
 from parapoint.method import MissingError, UnsupportedError
 from parapoint.planar.domains import FlatteningError
 from parapoint.surfaces.areas import signed_areas

@@ -24,8 +24,8 @@ from benchmarks.metrics.grades import GRADES
 from benchmarks.metrics.state import MapState
 from benchmarks.metrics.table import METRICS
 from parapoint import Mesh, PointCloud, console
-from parapoint.files.point_writers import write_points
 from parapoint.files.reading import read_parameterized
+from parapoint.files.writing.point_writers import write_points
 
 # Two quads side by side; the second is drawn twice as long, in a chart of its own.
 OBJ = """v 0 0 0

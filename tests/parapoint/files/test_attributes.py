@@ -8,8 +8,8 @@ import pytest
 
 from parapoint import InputError, PointCloud
 from parapoint.files.pieces import point_pieces
-from parapoint.files.point_writers import write_points
 from parapoint.files.reading import read_polygons, read_surface
+from parapoint.files.writing.point_writers import write_points
 
 POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 RGB = np.array([[255, 0, 0], [0, 128, 0], [1, 2, 3], [9, 8, 7]], dtype=np.uint8)

@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from parapoint import InputError, Mesh, Parameterization, PointCloud
-from parapoint.files import point_writers
-from parapoint.files.mesh_writers import write_obj
-from parapoint.files.point_writers import write_points
 from parapoint.files.reading import FORMATS, has_faces, read_parameterized, read_surface
+from parapoint.files.writing import point_writers
+from parapoint.files.writing.mesh_writers import write_obj
+from parapoint.files.writing.point_writers import write_points
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
 TRIANGLES = [[0, 1, 2], [0, 2, 3]]

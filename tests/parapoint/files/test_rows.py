@@ -10,8 +10,8 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from parapoint import PointCloud, cli, console
-from parapoint.files.point_writers import write_points
 from parapoint.files.reading import read_surface
+from parapoint.files.writing.point_writers import write_points
 from parapoint.surfaces.components import components
 from parapoint.surfaces.strays import fitted_rows
 from parapoint.surfaces.surface import FloatArray

@@ -7,7 +7,7 @@ import pytest
 
 from parapoint import Mesh, Parameterization
 from parapoint.commands.mesh_output import MeshOutput
-from parapoint.files.painting import WHITE, Material, Painting
+from parapoint.files.meshes.painting import WHITE, Material, Painting
 from parapoint.files.reading import Polygons
 from parapoint.surfaces.parameterization import Charted
 from parapoint.textures.repainting import repainted

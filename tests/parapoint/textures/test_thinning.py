@@ -10,8 +10,8 @@ from parapoint import Mesh, Parameterization, PointCloud
 from parapoint.errors import InputError
 from parapoint.files import pieces
 from parapoint.files.pieces import point_pieces
-from parapoint.files.point_writers import write_points
 from parapoint.files.reading import read_surface
+from parapoint.files.writing.point_writers import write_points
 from parapoint.surfaces.parameterization import Charted
 from parapoint.textures.thinning import thinned
 

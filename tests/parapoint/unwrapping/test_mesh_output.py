@@ -11,12 +11,12 @@ from PIL import Image
 
 from parapoint import InputError, Mesh, Parameterization
 from parapoint.commands.mesh_output import mesh_output
-from parapoint.files.gltf import opened
-from parapoint.files.mesh_writers import write_glb, write_ply
-from parapoint.files.painting import painting_of
-from parapoint.files.ply import Table
-from parapoint.files.ply import opened as opened_ply
+from parapoint.files.meshes.gltf import opened
+from parapoint.files.meshes.painting import painting_of
+from parapoint.files.meshes.ply import Table
+from parapoint.files.meshes.ply import opened as opened_ply
 from parapoint.files.reading import read_parameterized, read_polygons
+from parapoint.files.writing.mesh_writers import write_glb, write_ply
 from parapoint.surfaces.parameterization import Charted
 
 SIDE = 4

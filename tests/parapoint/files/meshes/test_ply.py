@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from parapoint.errors import InputError
-from parapoint.files import ply, ply_body
 from parapoint.files.content import NO_UV
-from parapoint.files.ply import Column, Table
-from parapoint.files.ply_rewriting import encoded
+from parapoint.files.meshes import ply, ply_body
+from parapoint.files.meshes.ply import Column, Table
+from parapoint.files.writing.ply_rewriting import encoded
 
 VERTICES = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
 CORNERS = struct.pack("<12f", *(0, 0, 0), *(1, 0, 0), *(1, 1, 0), *(0, 1, 0))

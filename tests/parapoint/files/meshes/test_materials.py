@@ -8,10 +8,10 @@ import pytest
 from PIL import Image
 
 from parapoint.commands.mesh_output import mesh_output
-from parapoint.files.materials import materials_of, named_libraries
-from parapoint.files.obj_rewriting import write_library
-from parapoint.files.painting import painting_of
+from parapoint.files.meshes.materials import materials_of, named_libraries
+from parapoint.files.meshes.painting import painting_of
 from parapoint.files.reading import Polygons, read_polygons
+from parapoint.files.writing.obj_rewriting import write_library
 from parapoint.surfaces.parameterization import Charted, Parameterization
 
 RED, BLUE, WHITE = (255, 0, 0), (0, 0, 255), (255, 255, 255)

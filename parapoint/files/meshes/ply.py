@@ -25,7 +25,7 @@ from parapoint.files.content import (
     strip_triangles,
     whole,
 )
-from parapoint.files.ply_body import (
+from parapoint.files.meshes.ply_body import (
     BLOCK,
     Body,
     Property,

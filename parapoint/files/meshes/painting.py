@@ -142,7 +142,7 @@ def painting_of(path: Path, polygon_of: IntArray, uv: FloatArray | None) -> Pain
 
 
 def _obj(path: Path) -> tuple[tuple[Material, ...], IntArray]:
-    from parapoint.files.materials import libraries, material_names, materials_of
+    from parapoint.files.meshes.materials import libraries, material_names, materials_of
 
     known = materials_of(libraries(path)[0])
     names, of = material_names(path.read_bytes())
@@ -154,7 +154,7 @@ def _obj(path: Path) -> tuple[tuple[Material, ...], IntArray]:
 
 
 def _ply(path: Path) -> tuple[tuple[Material, ...], IntArray]:
-    from parapoint.files.ply_rewriting import pictures_of
+    from parapoint.files.writing.ply_rewriting import pictures_of
 
     names, number_of = pictures_of(path)
     materials = []
@@ -167,8 +167,8 @@ def _ply(path: Path) -> tuple[tuple[Material, ...], IntArray]:
 
 
 def _gltf(path: Path) -> tuple[tuple[Material, ...], IntArray]:
-    from parapoint.files.gltf import opened
-    from parapoint.files.gltf_primitives import draws_triangles
+    from parapoint.files.meshes.gltf import opened
+    from parapoint.files.meshes.gltf_primitives import draws_triangles
 
     tree = opened(path)
     pictures: dict[int, Picture] = {}

@@ -14,9 +14,9 @@ import numpy.typing as npt
 
 from parapoint.errors import InputError
 from parapoint.files.attributes import named_attributes, taken_normals
+from parapoint.files.clouds.xyz import table, text_lines
 from parapoint.files.content import Content, points_content, word_counts
 from parapoint.files.decoding import check_decoded
-from parapoint.files.xyz import table, text_lines
 from parapoint.surfaces.surface import FloatArray
 
 PACKED = {"rgb": 3, "rgba": 4}

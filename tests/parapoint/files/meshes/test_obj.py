@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from parapoint.errors import InputError
-from parapoint.files.obj import obj_lines
+from parapoint.files.meshes.obj import obj_lines
 from parapoint.files.reading import read_polygons, read_surface
 from parapoint.surfaces.surface import Mesh, PointCloud
 

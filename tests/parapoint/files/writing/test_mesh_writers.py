@@ -9,10 +9,10 @@ from numpy.testing import assert_allclose
 from PIL import Image
 
 from parapoint import InputError, Mesh, Parameterization
-from parapoint.files.mesh_writers import write_textured
 from parapoint.files.png import png
 from parapoint.files.reading import read_parameterized, read_surface
 from parapoint.files.targets import is_ours
+from parapoint.files.writing.mesh_writers import write_textured
 from parapoint.surfaces.parameterization import Charted
 
 TENT = Charted(

@@ -15,9 +15,9 @@ from PIL import Image
 
 from parapoint import InputError, Mesh, PointCloud
 from parapoint.files.attributes import unit_colours
-from parapoint.files.gltf import opened
-from parapoint.files.gltf_rewriting import rewrite_gltf
+from parapoint.files.meshes.gltf import opened
 from parapoint.files.reading import FORMATS, Polygons, read_polygons, read_surface
+from parapoint.files.writing.gltf_rewriting import rewrite_gltf
 from parapoint.surfaces.parameterization import Parameterization
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], "<f4")

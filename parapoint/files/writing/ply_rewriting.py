@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from parapoint.files.content import ranges
 from parapoint.files.decoding import plain
-from parapoint.files.ply import (
+from parapoint.files.meshes.ply import (
     INDICES,
     POLYGONS,
     UV_COLUMNS,
@@ -20,9 +20,9 @@ from parapoint.files.ply import (
     opened,
     ply,
 )
-from parapoint.files.point_writers import PLY_NAMES
 from parapoint.files.polygons import corner_rows
 from parapoint.files.targets import complete_file
+from parapoint.files.writing.point_writers import PLY_NAMES
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import IntArray
 

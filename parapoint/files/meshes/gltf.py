@@ -28,7 +28,7 @@ from parapoint.files.content import (
     whole,
 )
 from parapoint.files.decoding import check_decoded, plain
-from parapoint.files.gltf_primitives import draws_points, draws_triangles, mode_triangles
+from parapoint.files.meshes.gltf_primitives import draws_points, draws_triangles, mode_triangles
 from parapoint.surfaces.surface import FloatArray, IntArray
 
 GLTF_TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}

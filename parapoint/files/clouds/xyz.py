@@ -10,9 +10,9 @@ from itertools import product
 import numpy as np
 
 from parapoint.errors import InputError
-from parapoint.files.columns import UNEVEN, Columns, are_atoms, columns_of, is_number
+from parapoint.files.clouds.columns import UNEVEN, Columns, are_atoms, columns_of, is_number
+from parapoint.files.clouds.headings import Heading, heading_of
 from parapoint.files.content import Content, plain_numbers, points_content
-from parapoint.files.headings import Heading, heading_of
 from parapoint.surfaces.surface import FloatArray
 
 logger = logging.getLogger("parapoint")

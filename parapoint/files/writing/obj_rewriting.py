@@ -11,11 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from parapoint.files.decoding import plain
-from parapoint.files.materials import OF_PICTURE, library_lines, named_libraries
-from parapoint.files.mesh_writers import write_picture
-from parapoint.files.obj import obj_lines
+from parapoint.files.meshes.materials import OF_PICTURE, library_lines, named_libraries
+from parapoint.files.meshes.obj import obj_lines
 from parapoint.files.polygons import corner_rows
 from parapoint.files.targets import beside, complete_file, sealed_text
+from parapoint.files.writing.mesh_writers import write_picture
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import IntArray
 

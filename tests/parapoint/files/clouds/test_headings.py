@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from parapoint.errors import InputError
+from parapoint.files.clouds.xyz import xyz
 from parapoint.files.reading import read_surface
-from parapoint.files.xyz import xyz
 from parapoint.surfaces.surface import PointCloud
 
 NORTH_FIRST = [[101.5, 200.25, 30.5], [102.5, 201.25, 31.5]]

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from parapoint.errors import InputError
 from parapoint.files.attributes import colours_of, named_attributes, taken_normals
+from parapoint.files.clouds.headings import Heading
 from parapoint.files.content import Content, points_content
-from parapoint.files.headings import Heading
 from parapoint.surfaces.surface import FloatArray
 
 logger = logging.getLogger("parapoint")

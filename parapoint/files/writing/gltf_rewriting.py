@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from parapoint.errors import InputError
-from parapoint.files.gltf import Gltf, opened
-from parapoint.files.gltf_primitives import draws_triangles
+from parapoint.files.meshes.gltf import Gltf, opened
+from parapoint.files.meshes.gltf_primitives import draws_triangles
 from parapoint.files.png import png
 from parapoint.files.targets import complete_file
 from parapoint.surfaces.parameterization import Parameterization

@@ -1,0 +1,1 @@
+"""Formats of clouds alone: bytes in, `Content` out."""

@@ -1,0 +1,1 @@
+"""Files written: anew, or again with new UVs."""
