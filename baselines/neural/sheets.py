@@ -102,7 +102,8 @@ def _refined(sheet: Sheet, uv: Tensor, points: Tensor) -> tuple[Tensor, Tensor]:
         best = torch.minimum(distance, best)
         jacobian = torch.stack(tangents, dim=2)
         gram = jacobian.mT @ jacobian + EPSILON * torch.eye(2)
-        move = torch.linalg.solve(gram, (jacobian.mT @ away[:, :, None]))[:, :, 0]
+        solved, _ = torch.linalg.solve_ex(gram, jacobian.mT @ away[:, :, None])
+        move = solved[:, :, 0].nan_to_num(0, 0, 0)  # where the sheet is folded flat it stays
         uv = (uv + move).clamp(-1, 1)
     return kept, best
 

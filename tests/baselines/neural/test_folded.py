@@ -236,6 +236,18 @@ def test_a_cell_whose_edges_are_pulled_apart_tears_and_has_no_preimages():
     assert not torch.stack(tangents).any()  # no way leads out of it
 
 
+def test_a_sheet_that_is_folded_flat_still_has_nearest_places():
+    """It is a line, and so large that nothing added to its squares is felt."""
+
+    def line(x: torch.Tensor) -> torch.Tensor:
+        return torch.nn.functional.pad(1000 * x.sum(dim=2, keepdim=True), (0, 2))
+
+    points = torch.tensor([[0.0, 0.0, 0.0], [500.0, 3.0, 0.0]])
+    found, distance = preimages(line, points)
+    assert found.isfinite().all()
+    np.testing.assert_allclose(distance, [0, 3], atol=1000 / 16)
+
+
 @pytest.mark.parametrize(("medians", "is_torn"), [(1.9, False), (2.1, True)])
 def test_an_edge_tears_where_it_is_longer_than_two_medians(medians, is_torn):
     width = (medians - 1) * 2 / SIDE
