@@ -31,7 +31,8 @@ import pooch
 from benchmarks.cases import derived
 from benchmarks.cases.builtin import BUILTIN
 from parapoint.errors import InputError
-from parapoint.files.reading import FORMATS, read_parameterized, read_surface
+from parapoint.files.reading import FORMATS, read_parameterized, read_surface, read_welded
+from parapoint.messages import said_of
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import PointCloud, Surface
 
@@ -273,6 +274,9 @@ def info(case: str) -> Model | None:
 def load(case: str) -> Surface:
     """The surface of a case: a model of the registry, a built-in surface, or a file.
 
+    The registry's disks stay cut as their authors cut them. In a user's file doubled vertices are
+    taken as one, so that the same surface gives the same results from OBJ, PLY and GLB.
+
     Raises:
         InputError: the name is unknown or ambiguous, or the file cannot be read or is not the one
             that the registry describes.
@@ -284,7 +288,10 @@ def load(case: str) -> Surface:
         return BUILTIN[name]()
     if _is_derived(name):
         return _derived(name)[0]
-    return read_surface(path(name))
+    if name in registry():
+        return read_surface(path(name))
+    with said_of(name):
+        return read_welded(name)
 
 
 def path(case: str) -> Path:

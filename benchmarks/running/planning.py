@@ -27,6 +27,7 @@ from benchmarks.store.rows import (
 )
 from parapoint.errors import InputError
 from parapoint.files.reading import faults_of
+from parapoint.messages import unsaid
 from parapoint.parameters import LARGEST_SEED, check_whole
 from parapoint.sources import source_hash
 
@@ -131,6 +132,8 @@ def choice(
 def check_readable(cases: Sequence[str], store: Store) -> None:
     """Read the models that were asked for by name, before the run writes anything.
 
+    What there is to say of them is said when they are stored.
+
     Raises:
         InputError: a file cannot be read, or every model is missing.
     """
@@ -139,7 +142,8 @@ def check_readable(cases: Sequence[str], store: Store) -> None:
     for case in cases:
         try:
             if _origin(case, readers) not in known:
-                models.load(case)
+                with unsaid():
+                    models.load(case)
         except models.MissingModelError as error:
             missing.append(error)
     if missing and len(missing) == len(cases):

@@ -94,6 +94,24 @@ def read_surface(path: str | Path) -> Surface:
         return _mesh(content)[0]
 
 
+def read_welded(path: str | Path) -> Surface:
+    """The surface in a file as `read_surface` has it, with vertices at one place taken as one.
+
+    Writers double the vertices of a mesh where UVs or normals differ; the surface goes on there.
+    A logged warning counts them. Rows of vertices are the file's, of which some are then unused.
+
+    Raises:
+        InputError: as for `read_surface`.
+    """
+    surface = read_surface(path)
+    if not isinstance(surface, Mesh):
+        return surface
+    whole = surface.welded
+    if count := int(surface.referenced.sum() - whole.referenced.sum()):
+        logger.warning("doubled vertices taken as one: %d", count)
+    return whole
+
+
 class Polygons(NamedTuple):
     """A mesh and the polygons that it was read from.
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
-import logging
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar
@@ -18,6 +16,7 @@ from parapoint.computed.faces import is_even, map_of_faces
 from parapoint.computed.parts import DISTORTIONS, towards_conformal
 from parapoint.computed.reconstruction import ReconstructionError
 from parapoint.errors import InputError
+from parapoint.messages import unsaid
 from parapoint.method import UnsupportedError
 from parapoint.parameters import LONGEST_SECONDS, check_choice, check_number
 from parapoint.planar.coarse import COARSE, LARGE, Led, led
@@ -334,18 +333,7 @@ def _map_of_points(mesh: Mesh, seed: int, deadline: float) -> tuple[FloatArray, 
     budget = None
     if math.isfinite(deadline):
         budget = max(deadline - clock.worked(), LEAST_TIME)
-    with _unsaid():
+    with unsaid():  # warnings would be of points that nobody but us has drawn
         made = ComputedMap(points, distortion="conformal", time_budget=budget)
         found = made.parameterize(mesh, seed=seed)
     return found.uv, dict(found.report)
-
-
-@contextlib.contextmanager
-def _unsaid() -> Iterator[None]:
-    """Leave warnings unsaid: they would be of points that nobody but us has drawn."""
-    logger = logging.getLogger("parapoint")
-    before, logger.disabled = logger.disabled, True
-    try:
-        yield
-    finally:
-        logger.disabled = before

@@ -138,7 +138,7 @@ def check_header(head: bytes, length: int) -> None:
         raise InputError(f"ends early: {points} points are announced")
     room = (length - start) // max(width, 1)
     if not compressed and head[25] < 3 and room > points:  # later ones may have more behind them
-        logger.warning("%d points are announced, but the file has room for %d", points, room)
+        logger.warning("points announced: %d; the file has room for %d", points, room)
     if 54 * records + 60 * extended > length:
         raise InputError(f"ends early: {records + extended} variable records are announced")
     check_decoded(width * points, length)

@@ -278,7 +278,7 @@ def xyz(data: bytes) -> Content:
         if announced > found:
             raise InputError(f"ends early: {announced} points are announced, {found} are there")
         if announced < found:
-            logger.warning("%d points are announced, but %d are there", announced, found)
+            logger.warning("points announced: %d; points there: %d", announced, found)
     return content
 
 

@@ -90,7 +90,7 @@ def _rows(lines: Rows, kind: bytes) -> tuple[Rows, Rows]:
     if fault:
         raise InputError(fault)
     if left:
-        logger.warning("%d lines behind the last face left out", left)
+        logger.warning("lines behind the last face left out: %d", left)
     return points, faces
 
 

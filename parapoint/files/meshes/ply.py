@@ -220,7 +220,7 @@ def ply(data: bytes) -> Content:
         indices = next((of for key, of in lists.items() if key in INDICES), None)
         if name not in POLYGONS:
             if indices is not None and count:
-                logger.warning("%d rows of the element %r left out: it is not known", count, name)
+                logger.warning("rows of the unknown element %r left out: %d", name, count)
         elif indices is not None:
             parts.append(_polygons(name, indices, lists.get("texcoord")))
         elif count:

@@ -31,7 +31,7 @@ def stl(data: bytes) -> Content:
     is_text = len(data) != size and b"facet" in data.lower()
     if HEADER < size < len(data) and b"facet" not in data[:size].lower():
         is_text = False  # some tools append what they know of the part
-        logger.warning("%d bytes behind the last triangle left out", len(data) - size)
+        logger.warning("bytes behind the last triangle left out: %d", len(data) - size)
     soup = _text(data.lower()) if is_text else _binary(data, announced)
     vertices, corners = welded(soup.reshape(-1, 3))
     return Content(vertices, np.full(len(corners) // 3, 3), corners)

@@ -175,6 +175,28 @@ def test_a_users_file_is_a_case(tmp_path, monkeypatch):
     assert models.info("camelhead") is not None
 
 
+@pytest.mark.parametrize("ending", [".obj", ".off"])
+@pytest.mark.parametrize("is_soup", [False, True], ids=["split along a seam", "soup"])
+def test_doubled_vertices_of_a_users_file_are_one(tmp_path, caplog, ending, is_soup):
+    ball = models.load("sphere")
+    vertices, faces = ball.vertices[ball.faces].reshape(-1, 3), np.arange(ball.faces.size)
+    if not is_soup:  # the corners of the first 100 faces have vertices of their own
+        first = ball.faces[100:].reshape(-1)
+        vertices = np.vstack([ball.vertices, vertices[:300]])
+        faces = np.concatenate([len(ball.vertices) + np.arange(300), first])
+    path = tmp_path / f"split{ending}"
+    rows = [f"{'v ' * (ending == '.obj')}{x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
+    corners = faces.reshape(-1, 3) + (ending == ".obj")
+    rows += [f"{'f' if ending == '.obj' else 3} {i} {j} {k}" for i, j, k in corners]
+    head = [] if ending == ".obj" else ["OFF", f"{len(vertices)} {len(corners)} 0"]
+    path.write_text("\n".join([*head, *rows]) + "\n")
+    found = models.load(str(path))
+    np.testing.assert_array_equal(found.vertices[found.faces], ball.vertices[ball.faces])
+    assert found.topology == ball.topology == "sphere"
+    count = len(np.unique(faces)) - len(ball.vertices)
+    assert caplog.messages == [f"{path}: doubled vertices taken as one: {count}"]
+
+
 def test_builtin_surfaces_load():
     assert isinstance(models.load("saddle"), Mesh)
     with pytest.raises(InputError, match="has no file"):

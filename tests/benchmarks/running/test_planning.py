@@ -33,6 +33,19 @@ def test_a_run_is_refused_only_where_every_model_is_missing(tmp_path):
         planning.check_readable(["sphere"], Store(tmp_path))
 
 
+def test_what_there_is_to_say_of_a_file_is_said_once(tmp_path, caplog):
+    path = tmp_path / "a.off"
+    path.write_text("OFF\n4 2 0\n0 0 0\n1 0 0\n0 1 0\n1 0 0\n3 0 1 2\n3 1 2 3\nspare\n")
+    store = Store(tmp_path / "results")
+    planning.check_readable([str(path)], store)
+    with store.writing():
+        planning.surfaces(store, [str(path)])
+    assert caplog.messages == [
+        f"{path}: lines behind the last face left out: 1",
+        f"{path}: doubled vertices taken as one: 1",
+    ]
+
+
 @pytest.mark.usefixtures("without_sphere")
 def test_a_missing_model_has_no_hash_and_a_reason(tmp_path):
     store = Store(tmp_path)

@@ -251,7 +251,7 @@ def test_las_with_more_points_than_announced_says_so(announced, is_said, tmp_pat
     struct.pack_into("<I", data, 107, announced)
     (tmp_path / "a.las").write_bytes(data)
     assert len(read_surface(tmp_path / "a.las").points) == announced
-    said = "3 points are announced, but the file has room for 4" in caplog.text
+    said = "points announced: 3; the file has room for 4" in caplog.text
     assert said is is_said
 
 

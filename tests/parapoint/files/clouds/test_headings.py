@@ -135,7 +135,7 @@ def test_the_count_of_a_text_is_held_to(
     assert_array_equal(cloud_of(tmp_path, head.format(2) + rows).points, POINTS)
     assert "announced" not in caplog.text
     assert_array_equal(cloud_of(tmp_path, head.format(1) + rows).points, POINTS)
-    assert "1 points are announced, but 2 are there" in caplog.text
+    assert "points announced: 1; points there: 2" in caplog.text
     with pytest.raises(InputError, match="ends early: 3 points are announced, 2 are there"):
         cloud_of(tmp_path, head.format(3) + rows)
 

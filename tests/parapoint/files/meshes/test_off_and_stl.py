@@ -101,7 +101,7 @@ def test_off_of_other_dimensions_is_refused(kind, tmp_path):
 def test_lines_behind_the_faces_of_off_are_told(tmp_path, caplog):
     (tmp_path / "a.off").write_text(off("OFF", faces="3 0 1 2\n") + "3 0 2 3\n1 2 3\n")
     assert isinstance(read_surface(tmp_path / "a.off"), Mesh)
-    assert "2 lines behind the last face left out" in caplog.text
+    assert "lines behind the last face left out: 2" in caplog.text
 
 
 TRIANGLES = SQUARE[[[0, 1, 2], [0, 2, 3]]]
@@ -177,4 +177,4 @@ def test_what_is_behind_the_triangles_of_stl_is_told(tmp_path, caplog):
     mesh = read_surface(tmp_path / "a.stl")
     assert isinstance(mesh, Mesh)
     assert len(mesh.faces) == 1
-    assert "50 bytes behind the last triangle left out" in caplog.text
+    assert "bytes behind the last triangle left out: 50" in caplog.text
