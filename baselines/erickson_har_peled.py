@@ -12,7 +12,14 @@ from scipy.sparse import csgraph
 from baselines.seamster import joining_tree
 from parapoint.method import UnsupportedError
 from parapoint.planar.descent import Run, sound
-from parapoint.surfaces.cutting import cut_along, cut_to_disk, edge_graph, edge_lengths, path_to
+from parapoint.surfaces.cutting import (
+    cut_along,
+    cut_to_disk,
+    edge_graph,
+    edge_lengths,
+    path_edges,
+    path_to,
+)
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh, Surface
 
@@ -137,7 +144,7 @@ def _loops(
 def _cycle(edge: IntArray, previous: IntArray) -> IntArray:
     """(n, 2) the edges of the loop that an edge closes, without the way from the root to it."""
     paths = [path_to(previous, int(end)) for end in edge]
-    steps = [np.stack([path[:-1], path[1:]], axis=1) for path in paths]
+    steps = [path_edges(path) for path in paths]
     every = np.concatenate([np.array(edge)[None], *steps])
     edges, times = np.unique(np.sort(every, axis=1), axis=0, return_counts=True)
     return np.asarray(edges[times == 1])

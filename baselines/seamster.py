@@ -21,6 +21,7 @@ from parapoint.surfaces.cutting import (
     edge_graph,
     edge_lengths,
     edge_mask,
+    path_edges,
     path_to,
 )
 from parapoint.surfaces.parameterization import Parameterization
@@ -129,7 +130,7 @@ def joining_tree(mesh: Mesh, cost: FloatArray, terminals: IntArray) -> IntArray:
     paths = [path_to(previous[i], int(ends[j])) for i, j in zip(tree.row, tree.col, strict=True)]
     if not paths:
         return np.zeros((0, 2), dtype=np.int64)
-    used = np.concatenate([np.stack([path[:-1], path[1:]], axis=1) for path in paths])
+    used = np.concatenate([path_edges(path) for path in paths])
     used = np.unique(np.sort(np.concatenate([used, mesh.edges[rim]]), axis=1), axis=0)
     weights = np.asarray(graph[used[:, 0], used[:, 1]]).reshape(-1)
     kept = csgraph.minimum_spanning_tree(sparse.coo_array((weights, tuple(used.T)), graph.shape))

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from scipy.sparse import csgraph
 
 from baselines.disks.gridded import image, psnr
 from baselines.disks.mean_value import balanced, mean_value_weights
@@ -23,7 +22,15 @@ from parapoint.planar.domains import (
     scaled,
 )
 from parapoint.surfaces.areas import signed_areas
-from parapoint.surfaces.cutting import cut_along, cut_to_disk, edge_graph, edge_lengths, path_to
+from parapoint.surfaces.cutting import (
+    cut_along,
+    cut_to_disk,
+    edge_graph,
+    edge_lengths,
+    path_edges,
+    path_to,
+    ways_to,
+)
 from parapoint.surfaces.parameterization import Parameterization, TracePoint
 from parapoint.surfaces.surface import FloatArray, Mesh, Surface
 
@@ -81,7 +88,7 @@ class GeometryImage:
             path = branch(mesh, stretches(disk, course[0]))
             if len(path) < 2:
                 break
-            longer = cut_along(mesh, np.stack([path[:-1], path[1:]], axis=1))
+            longer = cut_along(mesh, path_edges(path))
             after = laid_out(longer)
             if not stretch(after[0], after[1][-1]) < stretch(disk, course[-1]):
                 break
@@ -130,11 +137,7 @@ def square(points: FloatArray) -> FloatArray:
 
 def branch(mesh: Mesh, stretched: FloatArray) -> list[int]:
     """The vertices of the shortest path from the most stretched triangle to the boundary."""
-    distance, previous, _ = csgraph.dijkstra(
-        edge_graph(mesh, edge_lengths(mesh)),
-        indices=mesh.boundary_loops[0],
-        return_predecessors=True,
-        min_only=True,
-    )
+    graph = edge_graph(mesh, edge_lengths(mesh))
+    distance, previous = ways_to(graph, mesh.boundary_loops[0])
     corners = mesh.faces[int(stretched.argmax())]
     return path_to(previous, int(corners[distance[corners].argmax()]))

@@ -18,9 +18,9 @@ from scipy.sparse import csgraph
 from parapoint import clock
 from parapoint.computed.parts import Distortion
 from parapoint.computed.scale import area_discrepancy, even_scale, log_scale, mapped_areas, turning
-from parapoint.planar.embedding import embeddable, few_edges_graph, path_edges
+from parapoint.planar.embedding import embeddable, few_edges_graph
 from parapoint.surfaces.areas import LEAST_PART, STARVED
-from parapoint.surfaces.cutting import cut_along, cut_to_disk
+from parapoint.surfaces.cutting import cut_along, cut_to_disk, path_edges, path_to, ways_to
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
 
 AREA_DISCREPANCY = 0.6
@@ -90,11 +90,10 @@ def joined_loops(mesh: Mesh) -> Mesh:
         worst = int(wrong.argmax())
         if wrong[worst] < np.pi:
             break
-        distance, previous, _ = csgraph.dijkstra(
-            few_edges_graph(mesh), indices=loops[worst], return_predecessors=True, min_only=True
-        )
+        distance, previous = ways_to(few_edges_graph(mesh), loops[worst])
         others = np.concatenate([loop for i, loop in enumerate(loops) if i != worst])
-        mesh = cut_along(mesh, path_edges(previous, int(others[distance[others].argmin()])))
+        nearest = int(others[distance[others].argmin()])
+        mesh = cut_along(mesh, path_edges(path_to(previous, nearest)))
     return mesh
 
 
@@ -154,19 +153,14 @@ def _branches(now: Prediction, given_up: BoolArray) -> tuple[list[IntArray], Boo
     among what was given up (V,), which is returned with the rest.
     """
     graph = few_edges_graph(now.mesh)
-    distance, previous, _ = csgraph.dijkstra(
-        graph,
-        indices=np.concatenate(now.mesh.boundary_loops),
-        return_predecessors=True,
-        min_only=True,
-    )
+    distance, previous = ways_to(graph, np.concatenate(now.mesh.boundary_loops))
     paths = []
     for _ in range(TIPS):
         want = np.where(given_up, 0.0, now.wanted * distance)
         tip = int(want.argmax())
         if want[tip] == 0:
             break
-        paths.append(path_edges(previous, tip))
+        paths.append(path_edges(path_to(previous, tip)))
         near = csgraph.dijkstra(graph, indices=tip, limit=distance[tip] / 2)
         given_up = given_up | np.isfinite(near)
     return paths, given_up

@@ -10,12 +10,18 @@ from dataclasses import dataclass
 
 import igl
 import numpy as np
-from scipy.sparse import csgraph
 
 from parapoint.planar.descent import Run
 from parapoint.planar.domains import FlatteningError
 from parapoint.planar.growth import Need, grown
-from parapoint.surfaces.cutting import cut_along, edge_graph, edge_lengths, path_to
+from parapoint.surfaces.cutting import (
+    cut_along,
+    edge_graph,
+    edge_lengths,
+    path_edges,
+    path_to,
+    ways_to,
+)
 from parapoint.surfaces.surface import IntArray, Mesh, flat_faces
 
 COARSE = 4_000
@@ -91,10 +97,6 @@ def joined(mesh: Mesh, tips: list[int]) -> Mesh:
     """The domain cut along the shortest paths of edges from its boundary to each tip in turn."""
     for tip in tips:
         graph = edge_graph(mesh, edge_lengths(mesh))
-        rim = np.concatenate(mesh.boundary_loops)
-        _, previous, _ = csgraph.dijkstra(
-            graph, indices=rim, return_predecessors=True, min_only=True
-        )
-        path = np.array(path_to(previous, tip))
-        mesh = cut_along(mesh, np.stack([path[:-1], path[1:]], axis=1))
+        _, previous = ways_to(graph, np.concatenate(mesh.boundary_loops))
+        mesh = cut_along(mesh, path_edges(path_to(previous, tip)))
     return mesh

@@ -18,7 +18,7 @@ from parapoint.planar.scaffold import (
     of_area_one,
     steps_down,
 )
-from parapoint.surfaces.cutting import cut_along, edge_lengths, origin
+from parapoint.surfaces.cutting import cut_along, edge_lengths, origin, path_edges
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
 
 ENERGY = igl.SYMMETRIC_DIRICHLET
@@ -132,7 +132,7 @@ class Run:
             path: from a vertex inside to the seam or the boundary.
             goal: as of `improve`, for a free map.
         """
-        mesh = cut_along(self.mesh, np.stack([path[:-1], path[1:]], axis=1))
+        mesh = cut_along(self.mesh, path_edges(path))
         longer = Run(mesh, self.deadline, is_free=self.is_free)
         longer.tips = (*self.tips, int(path[0]))  # a cut leaves its vertex where it was
         uv = self.uv[origin(self.mesh, mesh)]

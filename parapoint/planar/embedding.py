@@ -7,12 +7,18 @@ from typing import Any
 import igl
 import numpy as np
 from scipy import sparse
-from scipy.sparse import csgraph
 from scipy.sparse.linalg import splu
 
 from parapoint.surfaces.areas import signed_areas
-from parapoint.surfaces.cutting import cut_along, edge_graph, edge_lengths, path_to
-from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, edge_table
+from parapoint.surfaces.cutting import (
+    cut_along,
+    edge_graph,
+    edge_lengths,
+    path_edges,
+    path_to,
+    ways_to,
+)
+from parapoint.surfaces.surface import FloatArray, Mesh, edge_table
 
 FLATTEST = 1e-22
 """Least area of a face, of the surface or the disk of radius 1: below it rounding decides."""
@@ -61,11 +67,9 @@ def embeddable(mesh: Mesh) -> Mesh:
         if not flat.any():
             break
         loops = mesh.boundary_loops
-        distance, previous, _ = csgraph.dijkstra(
-            few_edges_graph(mesh), indices=loops[0], return_predecessors=True, min_only=True
-        )
+        distance, previous = ways_to(few_edges_graph(mesh), loops[0])
         squeezed = np.unique(mesh.faces[flat])
-        path = path_edges(previous, int(squeezed[distance[squeezed].argmax()]))
+        path = path_edges(path_to(previous, int(squeezed[distance[squeezed].argmax()])))
         at_hole = np.flatnonzero(np.isin(path[:, 0], np.concatenate(loops)))
         path = path[at_hole[-1] :] if len(at_hole) else path
         if not len(path):
@@ -78,9 +82,3 @@ def few_edges_graph(mesh: Mesh) -> sparse.csr_matrix:
     """The symmetric (V, V) graph of the edges; their lengths plus the mean, so few are best."""
     lengths = edge_lengths(mesh)
     return edge_graph(mesh, lengths + lengths.mean())
-
-
-def path_edges(previous: IntArray, vertex: int) -> IntArray:
-    """(n, 2) edges from `vertex` back to the root of its tree in `previous`."""
-    path = path_to(previous, vertex)
-    return np.stack([path[:-1], path[1:]], axis=1).astype(np.int64)

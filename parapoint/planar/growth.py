@@ -6,13 +6,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
 from scipy.sparse import csgraph
 
 from parapoint.planar.descent import LEAST_ENERGY, Run
 from parapoint.planar.peaks import peaks
 from parapoint.surfaces.areas import LEAST_PART, starved_faces, starved_share
-from parapoint.surfaces.cutting import cut_along, edge_graph, edge_lengths, path_to
+from parapoint.surfaces.cutting import (
+    cut_along,
+    edge_graph,
+    edge_lengths,
+    path_edges,
+    path_to,
+    ways_to,
+)
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
 
 PRICE = 1.0
@@ -110,7 +116,7 @@ def _led_on(run: Run, need: Need) -> Run:
 def _longer(run: Run, need: Need) -> Run | None:
     """The map with one more branch; None where none is found."""
     graph = edge_graph(run.mesh, edge_lengths(run.mesh))
-    distance, previous = _ways(graph, np.concatenate(run.mesh.boundary_loops))
+    distance, previous = ways_to(graph, np.concatenate(run.mesh.boundary_loops))
     excess = _excess(run)
     worth = _mean_around(run.mesh, excess) * distance
     if need.is_starved(run):
@@ -146,7 +152,7 @@ def _branched(run: Run, need: Need) -> Run:
     graph = edge_graph(run.mesh, edge_lengths(run.mesh))
     seam = np.concatenate(run.mesh.boundary_loops)
     toll = need.toll(run)
-    distance, previous = _ways(graph, seam)
+    distance, previous = ways_to(graph, seam)
     prizes = peaks(run.mesh, graph, distance, _excess(run), toll)
     tips: list[int] = []
     paths: list[IntArray] = []
@@ -154,26 +160,18 @@ def _branched(run: Run, need: Need) -> Run:
     while prizes := {tip: prize for tip, prize in prizes.items() if distance[tip] > 0}:
         gains = {tip: prize - toll(float(distance[tip])) for tip, prize in prizes.items()}
         tip = max(gains, key=gains.__getitem__)
-        path = np.array(path_to(previous, tip))
+        path = path_to(previous, tip)
         tips.append(tip)
-        paths.append(np.stack([path[:-1], path[1:]], axis=1))
+        paths.append(path_edges(path))
         sums.append(gains[tip])
         seam = np.union1d(seam, path)
-        distance, previous = _ways(graph, seam)
+        distance, previous = ways_to(graph, seam)
     count = int(np.argmax(np.cumsum([0.0, *sums])))
     if count < 2:
         return run
     longer = Run(cut_along(run.mesh, np.concatenate(paths[:count])), run.deadline)
     longer.tips = (*run.tips, *tips[:count])
     return longer
-
-
-def _ways(graph: sparse.csr_matrix, seam: IntArray) -> tuple[FloatArray, IntArray]:
-    """(V,) each vertex's distance from the nearest vertex of the seam, and the next on the way."""
-    distance, previous, _ = csgraph.dijkstra(
-        graph, indices=seam, return_predecessors=True, min_only=True
-    )
-    return distance, previous
 
 
 def _excess(run: Run) -> FloatArray:

@@ -14,7 +14,15 @@ import numpy as np
 from scipy.sparse import csgraph
 
 from parapoint.surfaces.areas import cross
-from parapoint.surfaces.cutting import disk_cut, edge_graph, edge_lengths, edge_mask, path_to
+from parapoint.surfaces.cutting import (
+    disk_cut,
+    edge_graph,
+    edge_lengths,
+    edge_mask,
+    path_edges,
+    path_to,
+    ways_to,
+)
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
 
@@ -124,14 +132,11 @@ def learned_seam(mesh: Mesh, uv: FloatArray) -> BoolArray:
     ends = np.unique(mesh.edges[band])
     graph = edge_graph(mesh, cost)
     while len(ends):
-        distance, previous, _ = csgraph.dijkstra(
-            graph, indices=np.unique(mesh.edges[cut]), return_predecessors=True, min_only=True
-        )
+        distance, previous = ways_to(graph, np.unique(mesh.edges[cut]))
         tip = int(ends[distance[ends].argmax()])
         if distance[tip] < SHORTEST_BRANCH * IN_BAND * lengths.mean():
             break
-        path = path_to(previous, tip)
-        cut = cut | edge_mask(mesh, np.stack([path[:-1], path[1:]], axis=1))
+        cut = cut | edge_mask(mesh, path_edges(path_to(previous, tip)))
     return np.asarray(cut & inner)
 
 
@@ -146,7 +151,7 @@ def _longest_path(mesh: Mesh, cost: FloatArray, band: BoolArray) -> BoolArray:
     path = path_to(previous, end)
     if len(path) < 3:  # one edge opens nothing
         return disk_cut(mesh)
-    return edge_mask(mesh, np.stack([path[:-1], path[1:]], axis=1))
+    return edge_mask(mesh, path_edges(path))
 
 
 def opened(mesh: Mesh, uv: FloatArray, across: BoolArray) -> Parameterization:

@@ -17,6 +17,8 @@ methods for disks can leave its inner loops free (`parapoint.surfaces.preparatio
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
@@ -175,7 +177,7 @@ def _far_path(mesh: Mesh, lengths: FloatArray) -> BoolArray:
     if len(path) == 2:  # one edge opens nothing: go on to a third corner of a face
         face = next(row for row in mesh.faces.tolist() if set(path) <= set(row))
         path += [vertex for vertex in face if vertex not in path]
-    return edge_mask(mesh, np.stack([path[:-1], path[1:]], axis=1))
+    return edge_mask(mesh, path_edges(path))
 
 
 def origin(mesh: Mesh, cut: Mesh) -> IntArray:
@@ -185,12 +187,29 @@ def origin(mesh: Mesh, cut: Mesh) -> IntArray:
     return rows
 
 
+def ways_to(graph: sparse.csr_matrix, roots: IntArray) -> tuple[FloatArray, IntArray]:
+    """(V,) each vertex's distance from the nearest of the roots, and the next vertex on the way.
+
+    The next vertex is negative at a root, and where no way leads to one.
+    """
+    distance, previous, _ = csgraph.dijkstra(
+        graph, indices=roots, return_predecessors=True, min_only=True
+    )
+    return distance, previous
+
+
 def path_to(previous: IntArray, vertex: int) -> list[int]:
     """The vertices from one back to the root of its tree, given each vertex's predecessor (V,)."""
     path = [vertex]
     while previous[path[-1]] >= 0:
         path.append(int(previous[path[-1]]))
     return path
+
+
+def path_edges(path: Sequence[int] | IntArray) -> IntArray:
+    """(n - 1, 2) the edges along a path of n vertices."""
+    vertices = np.asarray(path, dtype=np.int64)
+    return np.stack([vertices[:-1], vertices[1:]], axis=1)
 
 
 def _arcs(
@@ -202,9 +221,7 @@ def _arcs(
     two tree paths from its ends. The cotree is a spanning tree of the faces that crosses neither
     cut nor tree, and rather crosses edges of long arcs; the edges left over close the system.
     """
-    distance, previous, _ = csgraph.dijkstra(
-        edge_graph(mesh, lengths), indices=sources, return_predecessors=True, min_only=True
-    )
+    distance, previous = ways_to(edge_graph(mesh, lengths), sources)
     i, j = mesh.edges.T
     in_tree = (previous[i] == j) | (previous[j] == i)
     crossable = np.flatnonzero(~cut & ~in_tree)

@@ -3,7 +3,15 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from parapoint.errors import InputError
-from parapoint.surfaces.cutting import cut_along, cut_to_disk, disk_cut
+from parapoint.surfaces.cutting import (
+    cut_along,
+    cut_to_disk,
+    disk_cut,
+    edge_graph,
+    path_edges,
+    path_to,
+    ways_to,
+)
 from parapoint.surfaces.surface import Mesh
 from parapoint.testing import irregular_disk, sphere
 
@@ -195,3 +203,15 @@ def test_a_later_arc_starts_from_an_earlier_one():
     straight = [[8 + 17 * k, 25 + 17 * k] for k in range(5)]
     aside = [[8 + k + 34, 9 + k + 34] for k in range(4)]
     assert_array_equal(ends[cut], sorted(straight + aside))
+
+
+def test_the_way_from_a_vertex_leads_to_the_nearest_root():
+    #  0 - 1 - 2 - 3 and 4, 5 apart; the edge from 1 to 2 is long
+    mesh = Mesh(np.eye(6, 3), [[0, 1, 1], [1, 2, 2], [2, 3, 3], [4, 5, 5]])
+    lengths = np.array([{(0, 1): 1.0, (1, 2): 5.0}.get(tuple(edge), 2.0) for edge in mesh.edges])
+    distance, previous = ways_to(edge_graph(mesh, lengths), np.array([0, 3]))
+    assert_array_equal(distance, [0, 1, 2, 0, np.inf, np.inf])
+    assert [path_to(previous, vertex) for vertex in range(5)] == [[0], [1, 0], [2, 3], [3], [4]]
+    distance, previous = ways_to(edge_graph(mesh, lengths), np.array([0]))
+    assert_array_equal(path_edges(path_to(previous, 3)), [[3, 2], [2, 1], [1, 0]])
+    assert path_edges(path_to(previous, 0)).shape == (0, 2)
