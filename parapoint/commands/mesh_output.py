@@ -11,7 +11,8 @@ from parapoint.commands.output import SIDES, TEXTURE
 from parapoint.commands.progress import Tell, baking, untold
 from parapoint.files.meshes.gltf import opened
 from parapoint.files.meshes.materials import libraries, material_names
-from parapoint.files.meshes.painting import Painting, Picture, bare_name, painting_of
+from parapoint.files.meshes.painting import Painting, painting_of
+from parapoint.files.meshes.pictures import Picture, bare_name
 from parapoint.files.reading import Polygons, faults_of
 from parapoint.files.targets import checked_target
 from parapoint.files.writing.gltf_rewriting import check_rewritable, has_colours, rewrite_gltf

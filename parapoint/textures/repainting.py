@@ -6,7 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from parapoint.files.attributes import srgb, unit_colours
-from parapoint.files.meshes.painting import WHITE, Painting, Picture
+from parapoint.files.meshes.painting import Painting
+from parapoint.files.meshes.pictures import WHITE, Picture
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.surface import FloatArray
 from parapoint.textures.baking import MARGIN, Done, dilated, painted, unwatched

@@ -11,7 +11,7 @@ import numpy as np
 from parapoint.errors import InputError
 from parapoint.files.decoding import plain
 from parapoint.files.meshes.obj import obj_lines
-from parapoint.files.meshes.painting import WHITE, Material, bare_name, named_file, read_picture
+from parapoint.files.meshes.pictures import WHITE, Material, bare_name, named_file, read_picture
 from parapoint.surfaces.surface import IntArray
 
 LIBRARY = re.compile(r'"([^"]+)"|(\S.*?\.mtl)(?=\s|$)|(\S.*)', re.IGNORECASE)

@@ -7,7 +7,8 @@ import pytest
 
 from parapoint import Mesh, Parameterization
 from parapoint.commands.mesh_output import MeshOutput
-from parapoint.files.meshes.painting import WHITE, Material, Painting
+from parapoint.files.meshes.painting import Painting
+from parapoint.files.meshes.pictures import WHITE, Material
 from parapoint.files.reading import Polygons
 from parapoint.surfaces.parameterization import Charted
 from parapoint.textures.repainting import repainted
