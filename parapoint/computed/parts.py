@@ -37,7 +37,8 @@ def parts_kept(
 ) -> tuple[Mesh, FloatArray]:
     """The domain, its seam perhaps longer, and a one-to-one map of it that starves no part.
 
-    Where the time is up, or no branch of the seam helps, a part may stay starved.
+    Where the time is up, or no branch of the seam helps, a part may stay starved. A balanced map
+    never starves more than the conformal one.
 
     Args:
         disk: a planar domain, faces counter-clockwise.
@@ -47,8 +48,10 @@ def parts_kept(
     """
     if distortion == "conformal":
         return disk, uv
-    if distortion == "balanced" and starved_share(disk, uv) <= LEAST_PART:
+    starved = starved_share(disk, uv)
+    if distortion == "balanced" and starved <= LEAST_PART:
         return disk, uv
+    conformal = disk, uv
     size = np.sqrt(disk.face_areas.sum())
     unit = of_area_one(disk.vertices, disk.faces)
     uv = uv / np.sqrt(signed_areas(uv, unit.faces).sum())
@@ -59,6 +62,8 @@ def parts_kept(
     unit, uv = run.mesh, run.uv
     if distortion == "balanced":
         uv = towards_conformal(unit, uv, deadline)
+        if starved_share(unit, uv) > starved:
+            return conformal
     return Mesh(size * unit.vertices, unit.faces), size * uv
 
 

@@ -35,6 +35,9 @@ PREDICTED_STARVED = LEAST_PART / 2
 FED = 0.35
 """Cuts are led to what has less than this part of its fair area, and are judged by it: above
 STARVED, so that a part is not just lifted over that bound."""
+LEAST_GAIN = 0.1
+"""A cut helps if one as long as sqrt(faces) edges, about once across the surface, would take away
+at least this share of the fault: 116 of the 120 cuts that help at all on thirteen models do."""
 TRIALS = 6
 """Times that no cut helps before what is starved is given up."""
 
@@ -103,8 +106,18 @@ def evened(mesh: Mesh, budget: int) -> Mesh:
 
 
 def fed(mesh: Mesh, deadline: float = math.inf) -> Mesh:
-    """The planar domain cut to what its flat map would starve of area, as far as that helps."""
-    return _led(mesh, _starvation, trials=TRIALS, deadline=deadline)
+    """The planar domain cut to what its flat map would starve of area, as far as that helps.
+
+    A domain with holes is fed as a disk, unless half as many edges do with its holes left: no cut
+    from the mouth of a vase that stands on a floor widens the neck by which it hangs on the floor.
+    Nor is the prediction as good around a hole, where the flat metric need not close up.
+    """
+    if len(mesh.boundary_loops) == 1 or _starvation(mesh).is_good:
+        return _led(mesh, _starvation, trials=TRIALS, deadline=deadline)
+    disk = _led(cut_to_disk(mesh), _starvation, trials=TRIALS, deadline=deadline)
+    half = (len(disk.vertices) - len(mesh.vertices)) / 2
+    holed = _led(mesh, _starvation, trials=TRIALS, budget=half, deadline=deadline)
+    return holed if _starvation(holed).is_good else disk
 
 
 def _led(
@@ -137,7 +150,7 @@ def _led(
         if not gains:
             break
         best = int(np.argmax(gains))
-        if gains[best] > 0:
+        if gains[best] > LEAST_GAIN * now.fault / len(mesh.faces) ** 0.5:
             now, length = longer[best]
             budget, failed = budget - length, 0
             given_up = np.zeros(len(now.mesh.vertices), dtype=bool)

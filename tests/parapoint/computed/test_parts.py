@@ -12,6 +12,8 @@ from parapoint.computed import parts
 from parapoint.computed.flattening import flattened
 from parapoint.computed.parts import parts_kept, towards_conformal
 from parapoint.planar.bijection import bijective_map, is_bijective
+from parapoint.planar.descent import Run
+from parapoint.planar.growth import Need
 from parapoint.surfaces.areas import LEAST_PART, starved_share
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray, Mesh
@@ -48,6 +50,18 @@ def test_the_same_at_every_scale(conformal) -> None:
     large, scaled = parts_kept(Mesh(scale * mesh.vertices, mesh.faces), scale * flat, "balanced")
     np.testing.assert_array_equal(small.faces, large.faces)
     np.testing.assert_allclose(scaled / scale, uv, atol=1e-6)
+
+
+def test_a_balanced_map_starves_no_more_than_the_conformal_one(conformal, monkeypatch) -> None:
+    def worse(run: Run, _: Need) -> Run:
+        run.uv = run.uv * np.where(run.uv[:, :1] > np.median(run.uv[:, 0]), 1, 1e-3)
+        return run
+
+    monkeypatch.setattr(parts, "grown", worse)
+    monkeypatch.setattr(parts, "towards_conformal", lambda _, uv, __: uv)
+    disk, uv = parts_kept(*conformal, "balanced")
+    assert disk is conformal[0]
+    assert uv is conformal[1]
 
 
 def test_a_map_that_starves_nothing_stays_conformal() -> None:

@@ -1,14 +1,17 @@
 """Where a cloud is cut open: to an even scale, and to what would be starved."""
 
 import numpy as np
+import pytest
 
 from benchmarks.cases import builtin
 from parapoint.computed import seams
+from parapoint.computed.flattening import flattened
 from parapoint.computed.layout import scaled_layout
 from parapoint.computed.scale import even_scale
 from parapoint.computed.seams import evened, fed, joined_loops, seamed
 from parapoint.planar.bijection import bijective_map
-from parapoint.surfaces.areas import signed_areas
+from parapoint.planar.descent import sound
+from parapoint.surfaces.areas import signed_areas, starved_share
 from parapoint.surfaces.surface import Mesh
 
 
@@ -152,6 +155,75 @@ def test_what_no_cut_helps_is_given_up(monkeypatch) -> None:
     monkeypatch.setattr(seams, "_starvation", hopeless)
     assert fed(mesh) is mesh
     assert 1 < len(tried) <= 1 + seams.TIPS * seams.TRIALS
+
+
+def test_cuts_that_hardly_help_are_given_up(monkeypatch) -> None:
+    # Each cut takes away a share of what is left: 36 of them in all, none as good as LEAST_GAIN.
+    mesh, least = plate_with_pins(21, [(220, 8)]), seams.LEAST_GAIN
+
+    def hardly(of: Mesh) -> seams.Prediction:
+        edges = len(of.vertices) - len(mesh.vertices)
+        fault = np.exp(-share * edges / np.sqrt(len(mesh.faces)))
+        return seams.Prediction(of, np.ones(len(of.vertices)), fault, is_good=edges > 60)
+
+    monkeypatch.setattr(seams, "_starvation", hardly)
+    share = least / 2
+    assert fed(mesh) is mesh
+    share = 2 * least
+    assert len(fed(mesh).vertices) > len(mesh.vertices) + 60
+
+
+def vase(mouth: float, neck: float, around: int = 24) -> Mesh:
+    """A ball of radius 0.5 that is open at its top and hangs by its neck on a disk of radius 1."""
+    foot, step = np.arcsin(2 * neck), 2 * np.pi * 0.3 / around
+    angle = np.linspace(foot, np.pi - np.arcsin(2 * mouth), int(0.5 * np.pi / step))
+    floor = np.linspace(1, neck, int(1 / step))[:-1]
+    radius = np.concatenate([floor, np.sin(angle) / 2])
+    height = np.concatenate([0 * floor, (np.cos(foot) - np.cos(angle)) / 2])
+    turn = 2 * np.pi * np.arange(around) / around
+    points = [np.outer(radius, np.cos(turn)), np.outer(radius, np.sin(turn))]
+    points.append(np.repeat(height[:, None], around, axis=1))
+    i, j = np.divmod(np.arange((len(radius) - 1) * around), around)
+    a, b = i * around + j, i * around + (j + 1) % around
+    faces = np.stack([a, a + around, b], axis=1), np.stack([b, a + around, b + around], axis=1)
+    return Mesh(np.stack(points, axis=2).reshape(-1, 3), np.concatenate(faces))
+
+
+@pytest.mark.parametrize("mouth", [0.05, 0.3])
+@pytest.mark.parametrize("neck", [0.05, 0.2])
+def test_a_vase_on_a_floor_is_opened_from_the_rim_of_the_floor(mouth, neck) -> None:
+    mesh = vase(mouth, neck)
+    assert len(mesh.boundary_loops) == 2
+    disk = fed(mesh)
+    assert len(disk.boundary_loops) == 1
+    assert seams._starvation(disk).is_good
+    assert starved_share(disk, bijective_map(disk, None)) < 0.01
+
+
+def test_a_sheet_keeps_its_holes_where_a_short_cut_feeds_a_part_of_it() -> None:
+    whole = plate_with_pins(41, [(8 * 41 + 20, 8)])
+    holes = [41 * y + x for y in (20, 26, 32) for x in (8, 14, 20, 26, 32)]
+    mesh = sound(Mesh(whole.vertices, whole.faces[~np.isin(whole.faces, holes).any(axis=1)]))
+    disk = fed(mesh)
+    assert len(disk.boundary_loops) == len(mesh.boundary_loops) == 16
+    assert seams._starvation(disk).is_good
+    assert 14 <= len(disk.vertices) - len(mesh.vertices) <= 20  # from the rim to the pin's tip
+
+
+@pytest.mark.parametrize(("balls", "seed"), [(1, 0), (2, 3)])
+def test_objects_on_a_floor_have_a_map_that_starves_nothing(balls, seed) -> None:
+    # Where a ball touches the floor, the triangulation leaves a hole beside its foot.
+    rng = np.random.default_rng(seed)
+    points = [np.column_stack([rng.uniform(-1, 1, (1500, 2)), np.zeros(1500)])]
+    for side in (-1, 1)[:balls]:
+        away = rng.normal(size=(577, 3))
+        away /= np.linalg.norm(away, axis=1, keepdims=True)
+        middle = np.array([0.5, 0.3, 0]) * side * (balls - 1) + np.array([0, 0, 0.35])
+        points.append(0.35 * away + middle)
+    flat = flattened(np.concatenate(points), distortion="balanced")
+    assert len(flat.mesh.boundary_loops) > 1
+    assert len(flat.disk.boundary_loops) == 1
+    assert starved_share(flat.disk, flat.uv) < 0.01
 
 
 def test_the_predicted_shares_are_those_of_the_map() -> None:
