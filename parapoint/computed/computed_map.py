@@ -19,6 +19,7 @@ from parapoint.estimator import Estimator
 from parapoint.fitting import Fitted, Progress, Session
 from parapoint.parameters import LARGEST_SEED, check_choice, check_whole
 from parapoint.surfaces.frame import Frame
+from parapoint.surfaces.normals import are_outer
 from parapoint.surfaces.sampling import (
     COINCIDENT,
     FEWEST_POINTS,
@@ -110,7 +111,7 @@ class ComputedMap(Estimator):
         else:
             few = min(count, max(FEWEST_POINTS, round(TRIAL_PER_SECOND * budget)))
             drawn = _computed_within(surface, few, count, self, deadline, say=say)
-        flat, cloud = _as_the_normals(drawn.flat, drawn, surface), drawn.cloud
+        flat, cloud = _outer_side_up(drawn.flat, drawn, surface), drawn.cloud
         if len(flat.missed):
             logger.warning(
                 "%d of %d points are not on the surface that was found%s",
@@ -170,13 +171,11 @@ def _rows_of(missing: FloatArray, frame: Frame, surface: Surface) -> str:
     return f": row{'s' * (len(rows) > 1)} {named(rows)}"
 
 
-def _as_the_normals(flat: FlatMap, drawn: _Drawn, surface: Surface) -> FlatMap:
-    """The map as seen from where the normals of a cloud point, if it has any."""
-    if not isinstance(surface, PointCloud) or surface.normals is None:
-        return flat
-    near = cKDTree(surface.points).query(drawn.frame.outside(flat.charted.mesh.vertices))[1]
-    agreement = (vertex_normals(flat.charted.mesh) * surface.normals[near]).sum(axis=1)
-    return flat.turned() if agreement.sum() < 0 else flat
+def _outer_side_up(flat: FlatMap, drawn: _Drawn, surface: Surface) -> FlatMap:
+    """The map as seen from the outer side of the surface."""
+    mesh = flat.charted.mesh
+    at = drawn.frame.outside(mesh.vertices)
+    return flat if are_outer(surface, at, vertex_normals(mesh)) else flat.turned()
 
 
 def _computed(surface: Surface, count: int, of: ComputedMap, deadline: float, say: Say) -> _Drawn:

@@ -17,6 +17,7 @@ from parapoint.learned.devices import device_of
 from parapoint.learned.presets import Preset
 from parapoint.parameters import check_whole
 from parapoint.surfaces.frame import Frame
+from parapoint.surfaces.normals import are_outer, oriented_normals
 from parapoint.surfaces.parameterization import TracePoint
 from parapoint.surfaces.sampling import FEWEST_POINTS, training_points, without_coincident
 from parapoint.surfaces.surface import FloatArray, Surface
@@ -149,6 +150,9 @@ class ParaPoint(Estimator):
         if trainer.divergences:
             logger.warning("training diverged once and went on with a smaller step")
         map_ = TrainedMap(trainer.networks, trainer.preset, self.threads)
+        normals = oriented_normals(frame.inside(points))
+        side = 1 if are_outer(surface, points, normals) else -1
+        map_ = map_.seen_from(frame.inside(points), side * normals)
         return Fitted(map_, frame, points, trace, self._report(trainer, trace) | found)
 
     def _trainer(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -18,6 +19,8 @@ from parapoint.learned.networks import ACTIVATIONS, Networks, SubNetworks, Surfa
 from parapoint.learned.presets import Preset
 from parapoint.surfaces.surface import FloatArray
 
+SEEN = 2_000
+"""Points at which a map is asked from which side it is seen."""
 BATCH = {"cpu": 2_048, "cuda": 65_536}
 """Points that go through the networks at a time: on a CPU their layers stay in its cache."""
 
@@ -30,19 +33,40 @@ class TrainedMap:
         networks: Deform, Cut, Stitch, Wrap and Unwrap.
         preset: the numbers of the run; the sizes of the networks are among them.
         threads: processor threads that torch may use, None for as many as it uses anyway.
+        is_mirrored: whether u is turned round, so that the outer side of the surface lies upwards.
     """
 
     networks: SurfaceNetworks
     preset: Preset
     threads: int | None = None
+    is_mirrored: bool = False
 
     def flatten(self, points: FloatArray) -> FloatArray:
         """See `SurfaceMap`: Unwrap(Cut(P))."""
-        return self._mapped(points, 2, self.networks.parameterization)
+        return self._sides() * self._mapped(points, 2, self.networks.parameterization)
 
     def lift(self, uv: FloatArray) -> FloatArray:
         """See `SurfaceMap`: Stitch(Wrap(Q))."""
-        return self._mapped(uv, 3, self.networks.surface)
+        return self._mapped(self._sides() * uv, 3, self.networks.surface)
+
+    def seen_from(self, points: FloatArray, normals: FloatArray) -> TrainedMap:
+        """The map as seen from the side of (N, 3) normals at points, of which some are looked at.
+
+        The gradients ∇u × ∇v of a map point to the side from which it is seen.
+        """
+        rows = slice(None, None, -(-len(points) // SEEN))
+        device = next(self.networks.parameters()).device
+        x = torch.from_numpy(points[rows]).float().to(device).requires_grad_()
+        with torch.enable_grad(), threads(self.threads):
+            uv = self.networks.parameterization(x)
+            (of_u,) = torch.autograd.grad(uv[:, 0].sum(), x, retain_graph=True)
+            (of_v,) = torch.autograd.grad(uv[:, 1].sum(), x)
+        up = torch.linalg.cross(of_u, of_v).cpu().numpy()
+        agree = np.sign((up * normals[rows]).sum(axis=1)).sum()
+        return dataclasses.replace(self, is_mirrored=bool(agree < 0))
+
+    def _sides(self) -> FloatArray:
+        return np.array([-1.0 if self.is_mirrored else 1.0, 1.0])
 
     def _mapped(
         self, values: FloatArray, columns: int, networks: Callable[[Tensor], Tensor]
@@ -66,7 +90,7 @@ class TrainedMap:
 
     def facts(self) -> dict[str, Any]:
         """See `SurfaceMap`."""
-        return {"preset": self.preset.facts()}
+        return {"preset": self.preset.facts(), "is_mirrored": self.is_mirrored}
 
     @classmethod
     def restored(cls, arrays: dict[str, np.ndarray], facts: dict[str, Any], device: str) -> Self:
@@ -82,7 +106,8 @@ class TrainedMap:
             raise InputError("the sizes of the networks do not fit the saved arrays")
         networks = new_networks(preset, torch.Generator())
         networks.load_state_dict({n: torch.tensor(array) for n, array in arrays.items()})
-        return cls(networks.to(device_of(device)), preset)
+        is_mirrored = facts.get("is_mirrored", False) is True  # models of older versions have none
+        return cls(networks.to(device_of(device)), preset, is_mirrored=is_mirrored)
 
 
 def new_networks(preset: Preset, generator: torch.Generator) -> SubNetworks:

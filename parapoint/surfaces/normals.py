@@ -1,4 +1,4 @@
-"""Normals of a cloud, oriented alike, and tangents around normals."""
+"""Normals of a cloud, oriented alike; which side of a surface is the outer one; tangents."""
 
 from __future__ import annotations
 
@@ -7,7 +7,17 @@ from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
-from parapoint.surfaces.surface import FloatArray
+from parapoint.surfaces.surface import FloatArray, Mesh, Surface, vertex_normals
+
+AGREEING = 0.5
+"""Normals of a cloud tell its sides only if their mean cosine with normals that are oriented alike
+is at least so large: those of many programs point to either side by chance."""
+BULGING = 1 / 3
+"""A surface bulges if its points lie in front of their middle by at least this share of their
+distance from it, in the mean: half of a ball by 1, a cap of 30 degrees by 0.36."""
+UPRIGHT = 0.5
+"""A flat surface faces along the first of z, y and x in which its mean normal has at least this
+share of its largest coordinate."""
 
 
 def oriented_normals(points: FloatArray, neighbours: int = 12) -> FloatArray:
@@ -32,6 +42,40 @@ def oriented_normals(points: FloatArray, neighbours: int = 12) -> FloatArray:
             if normals[child] @ normals[parents[child]] < 0:
                 normals[child] *= -1
     return np.asarray(normals)
+
+
+def are_outer(surface: Surface, points: FloatArray, normals: FloatArray) -> bool:
+    """Whether normals are on the outer side of a surface, which is seen when it is looked at.
+
+    Faces of a mesh turn counter-clockwise on that side, and normals of a cloud point to it. Where a
+    cloud has none that agree, a surface that bulges has its outer side where it does; a flat one
+    faces up, along z, or else along y or x.
+
+    Args:
+        surface: what the points are of.
+        points: (N, 3) points on it.
+        normals: (N, 3) unit normals at these, oriented alike.
+    """
+    if isinstance(surface, Mesh):
+        near = cKDTree(surface.vertices).query(points)[1]
+        return bool((vertex_normals(surface)[near] * normals).sum() >= 0)
+    if surface.normals is not None:
+        near = cKDTree(surface.points).query(points)[1]
+        cosine = float((surface.normals[near] * normals).sum(axis=1).mean())
+        if abs(cosine) >= AGREEING:
+            return cosine > 0
+    return _bulge_or_face_up(points, normals)
+
+
+def _bulge_or_face_up(points: FloatArray, normals: FloatArray) -> bool:
+    """Whether normals (N, 3) that are oriented alike are on the side that bulges, or face up."""
+    away = points - points.mean(axis=0)
+    bulge = float((away * normals).sum(axis=1).mean())
+    if abs(bulge) >= BULGING * np.linalg.norm(away, axis=1).mean():
+        return bulge > 0
+    upwards = normals.mean(axis=0)[::-1]
+    first = int((np.abs(upwards) >= UPRIGHT * np.abs(upwards).max()).argmax())
+    return bool(upwards[first] >= 0)
 
 
 def tangent_frames(points: FloatArray) -> FloatArray:

@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from parapoint import ComputedMap, Mesh, Parameterization, PointCloud
+from benchmarks.cases.builtin import BUILTIN
+from parapoint import ComputedMap, Mesh, Parameterization, ParaPoint, PointCloud
+from parapoint.estimator import load
 from parapoint.surfaces.parameterization import Charted
 
+WAVY = BUILTIN["wavy_sheet"]()
 RNG = np.random.default_rng(0)
 SHEET = np.column_stack([RNG.random((300, 2)) * [4, 2], np.zeros(300)]) + np.array([50, 60, 70])
 
@@ -41,6 +44,38 @@ def test_the_map_turns_as_the_normals_do(up) -> None:
     assert signed_area(model.mesh()) > 0
     uv = model.transform(SHEET)
     assert_allclose(model.inverse_transform(uv), SHEET, atol=1e-6)
+
+
+@pytest.mark.parametrize("is_turned", [False, True])
+def test_the_map_turns_as_the_faces_do(is_turned) -> None:
+    faces = WAVY.faces[:, ::-1] if is_turned else WAVY.faces
+    uv = ComputedMap(points=400).fit(Mesh(WAVY.vertices, faces)).transform(WAVY.vertices)
+    assert signed_area(Charted(WAVY, Parameterization(uv, faces))) > 0
+
+
+def test_tiles_without_normals_all_face_up() -> None:
+    for seed in range(3):
+        tile = np.random.default_rng(seed).random((200, 3)) * np.array([4, 4, 0])
+        tiles = np.concatenate([tile, tile + np.array([9, 0, 0])])
+        mesh = ComputedMap(components="each").fit(tiles).mesh().mesh
+        a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+        assert np.cross(b - a, c - a)[:, 2].min() > 0
+
+
+@pytest.mark.parametrize("preset", ["paper", "learned"])
+def test_a_trained_map_turns_as_the_normals_do_and_comes_back(preset, tmp_path) -> None:
+    model = ParaPoint(preset, points=150, iterations=4, device="cpu")
+    maps, back = {}, {}
+    for up in (1.0, -1.0):
+        model.fit(PointCloud(SHEET, np.tile([0, 0, up], (300, 1))))
+        maps[up] = model.transform(SHEET)
+        back[up] = model.inverse_transform(maps[up])
+        model.save(tmp_path / f"{up}")
+        assert_allclose(load(tmp_path / f"{up}").transform(SHEET), maps[up])
+    assert_allclose(maps[-1.0], maps[1.0] * np.array([-1, 1]))
+    assert_allclose(back[-1.0], back[1.0])
+    uv = model.fit(WAVY).transform(WAVY.vertices)
+    assert signed_area(Charted(WAVY, Parameterization(uv, WAVY.faces))) > 0
 
 
 def test_turned_is_the_other_side_and_turned_twice_the_same() -> None:

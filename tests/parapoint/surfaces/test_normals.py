@@ -1,8 +1,10 @@
 """Normals and tangents of a sphere."""
 
 import numpy as np
+import pytest
 
-from parapoint.surfaces.normals import oriented_normals, tangent_frames
+from parapoint import Mesh, PointCloud
+from parapoint.surfaces.normals import are_outer, oriented_normals, tangent_frames
 
 
 def sphere(count: int = 200) -> np.ndarray:
@@ -25,3 +27,63 @@ def test_tangent_frames_are_right_handed_around_the_normals() -> None:
     first, second = tangent_frames(points)
     np.testing.assert_allclose(np.cross(first, second), oriented_normals(points), atol=1e-12)
     np.testing.assert_allclose((first * second).sum(axis=1), 0, atol=1e-12)
+
+
+def cap(degrees: float, axis: int = 2, sign: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+    """Points of a cap of the unit sphere around an axis, and the normals on its outer side."""
+    rng = np.random.default_rng(1)
+    along = rng.uniform(np.cos(np.radians(degrees)), 1, 800)
+    turn, radius = rng.uniform(0, 2 * np.pi, 800), np.sqrt(1 - along**2)
+    points = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), along])
+    points = sign * np.roll(points, axis - 2, axis=1)
+    return points, points.copy()
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("degrees", [40.0, 90.0, 150.0, 180.0])
+def test_the_outer_side_is_where_a_surface_bulges(degrees, axis, sign) -> None:
+    points, outer = cap(degrees, axis, sign)
+    for moved in (points, 1e-6 * points + 5e5):
+        cloud = PointCloud(moved)
+        assert are_outer(cloud, moved, outer)
+        assert not are_outer(cloud, moved, -outer)
+
+
+@pytest.mark.parametrize(
+    ("towards", "up"),
+    [
+        ([0.0, 0, 1], [0.0, 0, 1]),
+        ([0.0, 0, -1], [0.0, 0, 1]),
+        ([0.2, 0.6, -0.8], [-0.2, -0.6, 0.8]),  # a slope
+        ([0.3, -1, 0.01], [-0.3, 1, -0.01]),  # a wall, though it leans a little
+        ([-1.0, 0.01, 0.01], [1.0, -0.01, -0.01]),
+    ],
+)
+def test_a_flat_surface_faces_up(towards, up) -> None:
+    bowl, facing = cap(20.0)  # a hollow as deep as 9 % of its width is flat
+    normal = np.array(towards) / np.linalg.norm(towards)
+    side = np.linalg.svd(normal[None])[2][1:]
+    turned = np.column_stack([*side, normal]) if np.linalg.det([*side, normal]) > 0 else None
+    turned = np.column_stack([side[1], side[0], normal]) if turned is None else turned
+    for sign in (1.0, -1.0):
+        points = (bowl * [1, 1, sign]) @ turned.T
+        normals = facing * [sign, sign, 1] @ turned.T  # all on the side of `towards`
+        is_up = float(np.dot(normal, up)) > 0
+        assert are_outer(PointCloud(points), points, normals) == is_up
+        assert are_outer(PointCloud(points), points, -normals) != is_up
+
+
+def test_normals_tell_the_side_where_they_agree() -> None:
+    points, outer = cap(180.0)
+    inwards = PointCloud(points, -outer)
+    assert not are_outer(inwards, points, outer)
+    by_chance = np.random.default_rng(0).choice([-1.0, 1.0], (len(points), 1))
+    assert are_outer(PointCloud(points, by_chance * outer), points, outer)
+
+
+def test_faces_tell_the_side() -> None:
+    for corners in ([0, 1, 2], [0, 2, 1]):
+        mesh = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [corners])
+        up = np.tile([0.0, 0, 1], (3, 1))
+        assert are_outer(mesh, mesh.vertices, up) == (corners[1] == 1)
