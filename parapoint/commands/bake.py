@@ -18,13 +18,13 @@ from parapoint.files.targets import checked_picture, complete_file, sealed_png
 from parapoint.fitting import Progress
 from parapoint.surfaces.parameterization import Charted
 from parapoint.textures.baking import (
-    MAPS,
     MARGIN,
     baked,
     check_in_square,
     check_size,
     check_together,
 )
+from parapoint.textures.known import MAPS
 from parapoint.textures.placing import Placing
 from parapoint.textures.thinning import thinned
 
@@ -55,7 +55,8 @@ def bake(
     MODEL is a folder of `fit`, or a mesh with UVs, of the same surface. CLOUD may have any number
     of points: LAS, LAZ and binary PLY are read a piece at a time, and no more points are kept than
     the texture can show. Of a folder the texture fits the UVs that `map` writes. A normal map is
-    in tangent space, as glTF has it; a position map is a geometry image of 16 bits.
+    in tangent space, as glTF has it, of a model that is shaded smoothly throughout; a position map
+    is a geometry image of 16 bits.
     """
     if kind not in MAPS:
         raise InputError(f"--map must be one of {', '.join(MAPS)}, not {kind!r}")

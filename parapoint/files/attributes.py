@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
 from typing import Any
 
 import numpy as np
@@ -72,9 +71,13 @@ def named_colours(values: npt.NDArray[Any]) -> npt.NDArray[Any] | None:
     """
     colours = colours_of(values)
     if colours is None:
-        least, most = (float(of(values, initial=0)) for of in (np.min, np.max))
+        least, most = _range(values)
         if least >= 0 and BRIGHT < most <= 255:
-            return np.asarray(np.rint(values), dtype=np.uint8)
+            whole: npt.NDArray[Any] = np.rint(values)
+            return whole / 255 if np.isnan(values).any() else whole.astype(np.uint8)
+        if values.dtype.kind == "f" and np.isnan(values).all():
+            logger.warning("colours left out: none of them is a number")
+            return None
         logger.warning(
             "colours left out: they go from %g to %g, but not from 0 to 1, 255 or 65535",
             least,
@@ -86,21 +89,29 @@ def named_colours(values: npt.NDArray[Any]) -> npt.NDArray[Any] | None:
 def colours_of(values: npt.NDArray[Any]) -> npt.NDArray[Any] | None:
     """(P, 3 or 4) numbers of any type as colours (see `PointCloud`); None where they are none.
 
-    Numbers of 16 bits none of which is over 255 are of 8 bits; so are whole floats over 1.
+    Numbers of 16 bits none of which is over 255 are of 8 bits; so are whole floats over 1. Where
+    some are NaN, as of points without a colour, all are fractions.
     """
-    least, most = (float(of(values, initial=0)) for of in (np.min, np.max))
-    if not (least >= 0 and math.isfinite(most)):  # not so either where one is NaN
+    least, most = _range(values)
+    if not (least >= 0 and most <= 65535):
         return None
     if values.dtype.kind == "f":
+        unknown = np.isnan(values)
         if most <= 1:
-            return values
-        if most > 65535 or (np.floor(values) != values).any():
+            return None if unknown.all() else values
+        if (np.floor(values) != values)[~unknown].any():
             return None
-    elif most > 65535:
-        return None
+        if unknown.any():
+            return values / (255 if most <= 255 else 65535)
     if values.dtype == np.uint8:
         return values
     return values.astype(np.uint8 if most <= 255 else np.uint16)
+
+
+def _range(values: npt.NDArray[Any]) -> tuple[float, float]:
+    """The least and the greatest of some numbers and 0; NaN has no say."""
+    known = values[~np.isnan(values)] if values.dtype.kind == "f" else values
+    return float(known.min(initial=0)), float(known.max(initial=0))
 
 
 def srgb(linear: npt.NDArray[Any]) -> npt.NDArray[Any]:

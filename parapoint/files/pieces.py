@@ -60,9 +60,9 @@ def point_pieces(path: str | Path) -> Iterator[PointCloud]:
 
 
 def _chosen(content: Content, rows: BoolArray) -> PointCloud:
-    """Some points, with their normals if these are finite."""
+    """Some points, with their normals, 0 where these are not finite."""
     normals = None if content.normals is None else content.normals[rows]
-    if normals is not None and not np.isfinite(normals).all():
-        normals = None
+    if normals is not None:
+        normals = np.where(np.isfinite(normals).all(axis=1, keepdims=True), normals, 0.0)
     attributes = {name: values[rows] for name, values in content.attributes.items()}
     return PointCloud(content.vertices[rows], normals, attributes=attributes)

@@ -380,9 +380,11 @@ def _point_cloud(content: Content, path: Path) -> PointCloud:
     if not finite.all():
         warn_of_dropped(path, int((~finite).sum()), len(finite))
     normals = None if content.normals is None else content.normals[finite]
-    if normals is not None and not np.isfinite(normals).all():
-        logger.warning("%s: normals left out: some are not finite", path)
-        normals = None
+    if normals is not None:
+        known = np.asarray(np.isfinite(normals).all(axis=1))
+        if not known.all():
+            logger.warning("%s: normals that are not finite, left out: %d", path, (~known).sum())
+            normals = np.where(known[:, None], normals, 0.0) if known.any() else None
     attributes = {name: values[finite] for name, values in content.attributes.items()}
     rows = content.rows
     if not finite.all():

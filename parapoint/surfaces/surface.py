@@ -301,7 +301,8 @@ class PointCloud:
         normals: (P, 3) float64 normals, or None.
         dropped: rows that were left out before, as they were not finite; for reports.
         attributes: whatever else is known at each point, by name: (P,) or (P, k) numbers of any
-            type. "colours" are (P, 3) or (P, 4) sRGB values, uint8, uint16, or floats from 0 to 1;
+            type. "colours" are (P, 3) or (P, 4) sRGB values, uint8, uint16, or floats from 0 to 1,
+            NaN where a point has none;
             "intensity" is (P,).
         rows: (P,) row of each point, from 0, in the file or array that the cloud comes from; None
             where all rows of that are there.
@@ -359,7 +360,7 @@ def _attribute(name: str, values: Any, count: int) -> npt.NDArray[Any]:
             raise InputError(f"colours must have shape (n, 3) or (n, 4), not {array.shape}")
         if array.dtype.kind != "f" and array.dtype not in (np.uint8, np.uint16):
             raise InputError(f"colours must be uint8, uint16 or floats, not {array.dtype}")
-        if array.dtype.kind == "f" and not ((array >= 0) & (array <= 1)).all():
+        if array.dtype.kind == "f" and not (((array >= 0) & (array <= 1)) | np.isnan(array)).all():
             raise InputError("colours that are floats must lie between 0 and 1")
     array.setflags(write=False)
     return array

@@ -16,14 +16,11 @@ from parapoint.files.attributes import unit_colours
 from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.surface import FloatArray, Mesh, PointCloud, Surface
+from parapoint.textures.known import facing_outwards, knowing
 from parapoint.textures.scattered import Scattered
 from parapoint.textures.tangents import in_tangent_space
 from parapoint.textures.texels import Texels, texels
 
-MAPS = ("colour", "normal", "position", "intensity")
-"""What can be baked."""
-SHOWN = {"colour": "colours", "intensity": "intensity"}
-"""The attribute of the points that a map shows, of those that show one."""
 SMALLEST, LARGEST = 16, 8192
 """Texels along a side of a texture."""
 MARGIN = 16
@@ -51,22 +48,6 @@ class Baked(NamedTuple):
     pixels: Pixels
     text: dict[str, str]
     fill: float
-
-
-def check_bakeable(cloud: PointCloud, kind: str) -> None:
-    """Check that a cloud has what a map of this kind shows.
-
-    Raises:
-        InputError: there is no such kind of map, or the cloud has no such attribute.
-    """
-    if kind not in MAPS:
-        raise InputError(f"--map must be one of {', '.join(MAPS)}, not {kind!r}")
-    needed = SHOWN.get(kind)
-    if needed is not None and needed not in cloud.attributes:
-        known = ", ".join(sorted(cloud.attributes)) or "none"
-        raise InputError(f"has no {needed} to bake; the attributes of its points: {known}")
-    if kind == "normal" and cloud.normals is None:
-        raise InputError("has no normals to bake; estimate them first, or bake another map")
 
 
 def check_size(size: int, margin: int) -> None:
@@ -146,6 +127,9 @@ def baked(
 ) -> Baked:
     """The texture of a mesh with what is known at the points of a cloud of the same surface.
 
+    Points without a value have no say: colours and intensities that are not finite, normals of
+    length 0. Normals are turned to the outside of the mesh where that is not their side.
+
     "colour" is 8-bit sRGB as the cloud has it. "normal" is an 8-bit tangent-space normal map as
     glTF has it (MikkTSpace tangents, green upwards). "intensity" is 16-bit grey from the least to
     the greatest value. "position" is a geometry image (Gu, Gortler and Hoppe 2002): 16-bit red,
@@ -163,7 +147,7 @@ def baked(
     Raises:
         InputError: the cloud has not what the map shows; the map leaves the unit square.
     """
-    check_bakeable(cloud, kind)
+    cloud = knowing(cloud, kind)
     check_in_square(charted)
     shown = texels(charted, size)
     return {"colour": _colour, "normal": _normal, "position": _position, "intensity": _intensity}[
@@ -187,9 +171,10 @@ def _intensity(shown: Texels, cloud: PointCloud, margin: int, done: Done) -> Bak
 
 
 def _position(shown: Texels, cloud: PointCloud, margin: int, done: Done) -> Baked:
-    surface = Scattered(cloud.points, cloud.points)
-    corner = cloud.points.min(axis=0)
-    span = max(float(np.ptp(cloud.points, axis=0).max()), 1e-300)
+    points = _around(shown.charted.mesh, cloud.points)
+    surface = Scattered(points, points)
+    corner = points.min(axis=0)
+    span = max(float(np.ptp(points, axis=0).max()), 1e-300)
     flat = painted(shown, 3, np.uint16, lambda at, _: 65535 * (surface(at) - corner) / span, done)
     alpha = np.zeros(shown.size**2, dtype=np.uint16)
     alpha[shown.places[shown.inside]] = 65535
@@ -202,9 +187,24 @@ def _position(shown: Texels, cloud: PointCloud, margin: int, done: Done) -> Bake
     return Baked(pixels, text, _fill(shown))
 
 
+def _around(mesh: Mesh, points: FloatArray) -> FloatArray:
+    """The points (N, 3) that lie in the box of a mesh, made wider by APART of its diagonal.
+
+    Raises:
+        InputError: none do.
+    """
+    corners = mesh.vertices[mesh.referenced]
+    reach = APART * np.linalg.norm(np.ptp(corners, axis=0))
+    low, high = corners.min(axis=0) - reach, corners.max(axis=0) + reach
+    near = ((points >= low) & (points <= high)).all(axis=1)
+    if not near.any():
+        raise InputError("does not lie on the surface of the model")
+    return np.asarray(points[near])
+
+
 def _normal(shown: Texels, cloud: PointCloud, margin: int, done: Done) -> Baked:
-    if cloud.normals is None:  # was checked
-        raise InputError("has no normals to bake")
+    cloud = facing_outwards(cloud, shown.charted.mesh)
+    assert cloud.normals is not None
     known = Scattered(cloud.points, cloud.normals)
     seen_from = in_tangent_space(shown)
 

@@ -71,9 +71,12 @@ def coloured(
     *,
     done: Done = unwatched,
 ) -> Picture:
-    """(size, size, 3) the texture of a mesh whose vertices (V,) have colours, as `PointCloud`."""
+    """(size, size, 3) the texture of a mesh whose vertices (V,) have colours, as `PointCloud`.
+
+    Vertices without a colour are white.
+    """
     shown = texels(charted, size)
-    known = 255 * unit_colours(colours[:, :3]).astype(np.float64)
+    known = 255 * np.nan_to_num(unit_colours(colours[:, :3]).astype(np.float64), nan=1.0)
 
     def values(_: FloatArray, rows: slice) -> FloatArray:
         corners = known[charted.mesh.faces[shown.faces[rows]]]

@@ -14,7 +14,7 @@ from parapoint.files.attributes import colours_of
 from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.surface import FloatArray, IntArray, PointCloud
-from parapoint.textures.baking import SHOWN, check_bakeable
+from parapoint.textures.known import SHOWN, check_bakeable, has_value, warn_of_unknown
 
 CUBES_OF_A_TEXEL = 2
 """Cubes along a texel's side at least. Of the points in a cube the first one stays, so that a texel
@@ -47,7 +47,7 @@ def thinned(
     kept: list[PointCloud] = []
     taken: IntArray = np.zeros(0, dtype=np.int64)
     kinds: set[np.dtype[Any]] = set()
-    count, has_shown = 0, kind not in SHOWN
+    count, unknown, has_shown = 0, 0, kind not in SHOWN
     for piece in pieces:
         check_bakeable(piece, kind)
         count += len(piece.points)
@@ -55,13 +55,16 @@ def thinned(
             values = piece.attributes[SHOWN[kind]]
             kinds.add(values.dtype)
             has_shown |= bool(values.any())
-        numbers, first = np.unique(cubes.of(piece.points), return_index=True)
+        known = np.flatnonzero(has_value(piece, kind))
+        numbers, first = np.unique(cubes.of(piece.points[known]), return_index=True)
         fresh = np.append(taken, -1)[np.searchsorted(taken, numbers)] != numbers
         if fresh.any():
             taken = np.sort(np.concatenate([taken, numbers[fresh]]), kind="stable")  # merges two
-            kept.append(_rows(piece, np.sort(first[fresh]), kind))
-    if not kept:
+            kept.append(_rows(piece, known[np.sort(first[fresh])], kind))
+        unknown += len(piece.points) - len(known)
+    if count == 0:
         raise InputError("has no point with finite coordinates")
+    warn_of_unknown(unknown, count, kind)
     if not has_shown:
         fault = (
             "all of its points are black" if kind == "colour" else "it is 0 at all of its points"

@@ -112,11 +112,13 @@ def _ply(file: IO[bytes], cloud: PointCloud, uv: FloatArray) -> None:
 
 
 def _obj(file: IO[bytes], cloud: PointCloud, uv: FloatArray) -> None:
-    """OBJ without faces: row k of v, vn and vt is point k."""
+    """OBJ without faces: row k of v, vn and vt is point k, white where it has no colour."""
     columns = {"v": cloud.points, "vn": cloud.normals, "vt": uv}
     colours = cloud.attributes.get("colours")
     if colours is not None:
-        columns["v"] = np.concatenate([cloud.points, unit_colours(colours)[:, :3]], axis=1)
+        columns["v"] = np.concatenate(
+            [cloud.points, np.nan_to_num(unit_colours(colours)[:, :3], nan=1.0)], axis=1
+        )
     for key, values in columns.items():
         if values is None:
             continue

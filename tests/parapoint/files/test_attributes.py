@@ -166,11 +166,11 @@ def test_floats_up_to_255_are_colours_under_their_name(kind, shift, tmp_path, ca
 @pytest.mark.parametrize(
     ("kind", "values", "says"),
     [
-        ("float", RGB / 100, "from 0 to 2.55"),
-        ("float", RGB + 0.5, "from 0 to 255.5"),
-        ("int", RGB.astype(int) * 300, "from 0 to 76500"),
-        ("float", RGB - 3.0, "from -3 to 252"),
-        ("float", np.full((4, 3), np.nan), "from nan to nan"),
+        ("float", RGB / 100, "they go from 0 to 2.55, but not"),
+        ("float", RGB + 0.5, "they go from 0 to 255.5, but not"),
+        ("int", RGB.astype(int) * 300, "they go from 0 to 76500, but not"),
+        ("float", RGB - 3.0, "they go from -3 to 252, but not"),
+        ("float", np.full((4, 3), np.nan), "none of them is a number"),
     ],
 )
 def test_colours_of_no_known_range_are_told_and_kept_apart(
@@ -179,7 +179,7 @@ def test_colours_of_no_known_range_are_told_and_kept_apart(
     cloud = read(tmp_path / "a.ply", ply_of(kind, NAMES[0], values))
     assert list(cloud.attributes) == list(NAMES[0])
     assert len(caplog.records) == 1
-    assert f"colours left out: they go {says}, but not" in caplog.text
+    assert f"colours left out: {says}" in caplog.text
 
 
 @pytest.mark.parametrize(
@@ -317,7 +317,6 @@ def test_attributes_are_written_beside_the_uv(ending, tmp_path) -> None:
         ("colours", RGB[:, :2], "colours must have shape"),
         ("colours", RGB.astype(np.int64), "colours must be uint8, uint16 or floats"),
         ("colours", RGB / 200, "must lie between 0 and 1"),
-        ("colours", np.full((4, 3), np.nan), "must lie between 0 and 1"),
         ("intensity", np.zeros(5), "5 intensity for 4 points"),
         ("label", np.array(["a"] * 4), "label must be numbers"),
     ],

@@ -76,7 +76,7 @@ def test_strips_are_triangles_of_which_every_second_is_turned(sizes, corners, tr
         (np.array([[0.0, 1.0, 65536.0]]), None),
         (np.array([[0.0, 1.5, 2.0]]), None),
         (np.array([[-1, 0, 0]], dtype=np.int64), None),
-        (np.array([[0.0, np.nan, 1.0]]), None),
+        (np.array([[np.nan, np.nan, np.nan]]), None),
         (np.array([[0.0, np.inf, 1.0]]), None),
     ],
 )
@@ -87,6 +87,15 @@ def test_colours_are_known_by_their_range(values, kind):
     else:
         assert found.dtype == kind
         assert_array_equal(found, values)
+
+
+@pytest.mark.parametrize("most", [1.0, 255.0, 65535.0])
+def test_colours_of_some_points_are_fractions(most):
+    values = np.array([[0.0, 0.0, most], [np.nan] * 3, [most, 0.0, 0.0]])
+    found = colours_of(values)
+    assert found.dtype.kind == "f"
+    np.testing.assert_array_equal(found, values / most)
+    assert colours_of(values + [[0, 0.5, 0]] * 3 if most > 1 else values - 1) is None
 
 
 def test_colours_as_fractions():
