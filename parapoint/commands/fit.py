@@ -14,7 +14,7 @@ from parapoint.commands.fitting import estimator_of, fitted
 from parapoint.commands.memory import memory_option
 from parapoint.commands.output import TEXTURE
 from parapoint.commands.progress import bar
-from parapoint.commands.telling import ADVICE_OF_CLOUDS, lines, warn
+from parapoint.commands.telling import advice_of_cloud, lines, warn
 from parapoint.errors import InputError
 from parapoint.files.reading import read_surface
 from parapoint.files.targets import checked_target
@@ -72,7 +72,7 @@ def fit(surface: str, out: str, preset: str, as_json: bool, **settings: Any) -> 
         logger.warning("%s", _how_to_go_on(out))
         raise
     facts = {"file": out, "faces": len(charted.mesh.faces), **found.facts(), **model.report_}
-    warn(facts, ADVICE_OF_CLOUDS)
+    warn(facts, advice_of_cloud(model.time_budget, model.get_params()["distortion"]))
     if as_json:
         print(json.dumps({"model": out, "estimator": type(model).__name__, **facts}))
     else:

@@ -51,7 +51,7 @@ def map_(model: str, surface: str, out: str, device: str, *, force: bool, as_jso
                 surface,
                 100 * (1 - on),
             )
-        facts = write(loaded, given, out, tell=tell)
+        facts = write(loaded, given, out, tell=tell, is_fitted=False)
     warn(facts, ADVICE_OF_MAPS)
     if as_json:
         print(json.dumps(facts))

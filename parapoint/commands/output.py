@@ -18,7 +18,7 @@ from parapoint.fitting import Progress
 from parapoint.surfaces.across_seams import Transform, edges_across_seam, opened
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.sampling import mean_spacing
-from parapoint.surfaces.strays import NAMED, far_from, named, unmapped
+from parapoint.surfaces.strays import NAMED, are_near, far_from, named, unmapped
 from parapoint.surfaces.surface import BoolArray, Mesh, Surface
 from parapoint.textures.baking import MARGIN, baked
 from parapoint.textures.checkerboard import checkerboard
@@ -77,6 +77,7 @@ def write(
     margin: int | None = None,
     preview: Path | None = None,
     tell: Tell = untold,
+    is_fitted: bool = True,
 ) -> dict[str, object]:
     """Map a surface into the unit square and write it; what was written, as facts.
 
@@ -89,6 +90,7 @@ def write(
         margin: texels around the map and its charts; 1 / 256 of the side if None.
         preview: a PNG file for a picture of the surface beside its layout, or None.
         tell: is called with each `Progress`.
+        is_fitted: whether the surface is that which the model was fitted to.
     """
     begun = time.perf_counter()
     tell(Progress("mapping"))
@@ -114,12 +116,17 @@ def write(
         else:
             write_textured(out, shown, pixels)
     elif ending == ".npz" or (ending in {".ply", ".obj"} and texture is None):
-        uv = unmapped(surface, _then(model.transform, placing)(points))
+        known = None if is_fitted else model.points_
+        uv = unmapped(surface, _then(model.transform, placing)(points), known)
         nowhere = np.flatnonzero(np.isnan(uv[:, 0]))
         facts |= {"mapped_points": len(uv) - len(nowhere), "unmapped_points": len(nowhere)}
         facts["unmapped_rows"] = surface.rows_of(nowhere[:NAMED]).tolist()
         write_points(out, surface, uv)
     else:
+        missed = int(str(model.report_.get("missed", 0)))
+        near = int(are_near(charted.mesh.vertices, points).sum())
+        on = min(near, len(points) - missed)
+        facts |= {"mapped_points": on, "unmapped_points": len(points) - on}
         facts |= {"faces": len(charted.mesh.faces), "texture": size}
         pixels = checkerboard(pixels=max(1, size // 32))
         if "colours" in surface.attributes:

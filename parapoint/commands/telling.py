@@ -13,6 +13,7 @@ Facts = dict[str, object]
 
 COUNTS = {
     "mapped_points": "points mapped",
+    "unmapped_points": "not",
     "faces": "faces",
     "welded": "doubled vertices taken as one",
     "iterations": "iterations",
@@ -23,17 +24,29 @@ ADVICE_OF_MESHES = {
     "overlap": "faces without area or a defective mesh can be the cause: clean it, or crop it",
     "starved": "a longer seam helps, as with --seam-price 0.03",
 }
-ADVICE_OF_CLOUDS = {
-    "overlap": "noise, strays or parts that only touch can be the cause: denoise it, crop it, or "
-    "take --components each",
-    "starved": "more time helps, and --distortion isometric, which keeps every part",
-}
 ADVICE_OF_MAPS = {
     "overlap": "the map is fitted to points, and faces across its seam may lie on others: unwrap "
     "cuts a mesh along its own edges",
     "starved": "a longer fit helps, or one with --distortion isometric",
 }
 """What helps where faces overlap, and where parts are starved."""
+
+
+def advice_of_cloud(time_budget: float | None, distortion: str | None) -> dict[str, str]:
+    """What helps where a map of a cloud overlaps, and where it starves parts, as it was asked for.
+
+    Args:
+        time_budget: seconds that the fit might take, or None.
+        distortion: what the map keeps, or None for the paper's training.
+    """
+    helps = ["more time"] * (time_budget is not None)
+    helps += ["--distortion isometric"] * (distortion != "isometric")
+    starved = " or ".join(helps) + " can help" if helps else "crop it to the part that matters"
+    overlap = (
+        "noise, strays or parts that only touch can be the cause: denoise it, crop it, or take "
+        "--components each"
+    )
+    return {"overlap": overlap, "starved": starved}
 
 
 def lines(facts: Facts) -> str:
@@ -61,7 +74,7 @@ def warn(facts: Facts, advice: dict[str, str]) -> None:
 
     Args:
         facts: of the map.
-        advice: ADVICE_OF_MESHES or ADVICE_OF_CLOUDS.
+        advice: what helps, as ADVICE_OF_MESHES has it.
     """
     if facts["flipped"] or facts["overlap"] != "none":
         logger.warning(

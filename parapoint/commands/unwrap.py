@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +15,7 @@ from parapoint.commands.fitting import estimator_of, fitted
 from parapoint.commands.memory import memory_option
 from parapoint.commands.output import TEXTURE, preview_target, target, write
 from parapoint.commands.progress import Tell, bar
-from parapoint.commands.telling import ADVICE_OF_CLOUDS, Facts, lines, warn
+from parapoint.commands.telling import Facts, advice_of_cloud, lines, warn
 from parapoint.errors import InputError
 from parapoint.files.reading import Polygons, read_polygons
 from parapoint.fitting import Progress
@@ -29,6 +30,8 @@ from parapoint.surfaces.components import COMPONENTS, components, largest_compon
 from parapoint.surfaces.surface import PointCloud
 from parapoint.textures.baking import MARGIN, check_size
 from parapoint.textures.placing import BORDER
+
+logger = logging.getLogger("parapoint")
 
 
 @click.command(no_args_is_help=True, options_metavar="[OPTIONS] --out FILE")
@@ -218,6 +221,8 @@ def _unwrap_cloud(given: PointCloud, asked: Asked, tell: Tell) -> Facts:
     for option, value in for_meshes.items():
         if value is not None:
             raise InputError(f"{option} is for meshes; {asked.surface} is a point cloud")
+    if asked.texture is not None and Path(asked.out).suffix.lower() == ".npz":
+        logger.warning("%s: no texture is written: this format has none", asked.out)
     names = ("time_budget", "components", "seed", "distortion")
     computed = estimator_of("computed", {name: getattr(asked, name) for name in names})
     model = fitted(asked.surface, given, computed, tell)
@@ -233,5 +238,5 @@ def _unwrap_cloud(given: PointCloud, asked: Asked, tell: Tell) -> Facts:
     )
     facts |= model.report_
     facts["seconds"] = round(time.perf_counter() - begun, 3)
-    warn(facts, ADVICE_OF_CLOUDS)
+    warn(facts, advice_of_cloud(asked.time_budget, asked.distortion))
     return facts

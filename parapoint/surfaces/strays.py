@@ -143,13 +143,32 @@ def named(rows: IntArray) -> str:
     return ", ".join(map(str, rows[:NAMED].tolist())) + ", ..." * (len(rows) > NAMED)
 
 
-def unmapped(surface: Surface, uv: FloatArray) -> FloatArray:
-    """The map (P, 2) of a surface's points with NaN at the stray ones."""
+def unmapped(surface: Surface, uv: FloatArray, known: FloatArray | None = None) -> FloatArray:
+    """The map (P, 2) of a surface's points with NaN at the stray ones.
+
+    Args:
+        surface: a mesh, of which no vertex is stray, or a cloud.
+        uv: its map.
+        known: (n, 3) points that the map was fitted to, where it was to another cloud: a point
+            beside these is none of its strays, however far it lies from its own cloud.
+    """
     if isinstance(surface, Mesh) or not (is_stray := stray_points(surface.points)).any():
         return uv
+    if known is not None:
+        is_stray[is_stray] = ~are_near(known, surface.points[is_stray])
     uv = uv.copy()
     uv[is_stray] = np.nan
     return uv
+
+
+def are_near(known: FloatArray, points: FloatArray) -> BoolArray:
+    """(N,) whether points (N, 3) are as near to known ones (n, 3) as no single stray one is."""
+    tree = cKDTree(known)
+    looked_at = known[:: len(known) // SAMPLED + 1]
+    spacing = np.median(tree.query(looked_at, min(NEAREST + 1, len(known)))[0][:, -1])
+    with np.errstate(over="ignore"):
+        distance = tree.query(points, distance_upper_bound=ALONE * spacing)[0]
+    return np.asarray(np.isfinite(distance))
 
 
 def far_from(known: FloatArray, points: FloatArray) -> BoolArray:

@@ -14,6 +14,7 @@ from rich.progress import Progress as Bar
 from parapoint import ComputedMap, PointCloud, cli
 from parapoint.commands.output import write
 from parapoint.commands.progress import bar
+from parapoint.commands.telling import advice_of_cloud
 from parapoint.files.reading import read_parameterized, read_surface
 from parapoint.files.writing.point_writers import write_points
 from parapoint.fitting import Progress
@@ -353,3 +354,39 @@ def test_wrong_use_is_one_line_and_nothing_written(arguments, message, tmp_path,
     assert err.count("\n") == 1
     assert not any(err.count(f"{name}: ") > 1 for name in names.values())
     assert {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
+
+
+def test_points_that_the_mesh_leaves_out_are_counted(bowl, tmp_path, capsys, caplog) -> None:
+    clump = 0.2 * np.random.default_rng(1).normal(size=(150, 3)) + [0, 0, 3]
+    path = tmp_path / "parts.xyz"
+    np.savetxt(path, np.concatenate([bowl.points, clump]))
+    arguments = ["unwrap", path, "--out", tmp_path / "a.glb", "--json"]
+    status, out, _ = run(arguments, capsys)
+    assert status == 0
+    facts = json.loads(out)
+    assert (facts["mapped_points"], facts["unmapped_points"]) == (COUNT, 150)
+    assert "--components each maps parts that stand apart" in caplog.text
+    caplog.clear()
+    status, out, _ = run([*arguments, "--components", "each"], capsys)
+    assert json.loads(out)["mapped_points"] > COUNT + 100
+    assert "--components each maps" not in caplog.text
+
+
+def test_a_texture_that_the_format_cannot_hold_is_told(scan, tmp_path, capsys, caplog) -> None:
+    target = tmp_path / "a.npz"
+    assert run(["unwrap", scan, "--out", target, "--texture", 64], capsys)[0] == 0
+    assert caplog.messages == [f"{target}: no texture is written: this format has none"]
+
+
+@pytest.mark.parametrize(
+    ("budget", "distortion", "says"),
+    [
+        (9.0, "balanced", "more time or --distortion isometric can help"),
+        (None, "balanced", "--distortion isometric can help"),
+        (None, None, "--distortion isometric can help"),
+        (9.0, "isometric", "more time can help"),
+        (None, "isometric", "crop it to the part that matters"),
+    ],
+)
+def test_advice_is_none_that_was_followed(budget, distortion, says) -> None:
+    assert advice_of_cloud(budget, distortion)["starved"] == says

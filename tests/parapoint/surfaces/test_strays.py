@@ -9,7 +9,7 @@ from numpy.testing import assert_array_equal
 from scipy.spatial import cKDTree
 
 from parapoint import ComputedMap, PointCloud
-from parapoint.surfaces.strays import far_from, stray_points
+from parapoint.surfaces.strays import are_near, far_from, stray_points, unmapped
 from parapoint.surfaces.surface import FloatArray
 
 
@@ -291,3 +291,17 @@ def test_many_places_alone_are_how_a_cloud_is_sampled() -> None:
     fine = np.column_stack([x.ravel(), y.ravel(), 0 * x.ravel()])
     coarse = np.column_stack([np.full(12, 45.0), 25.0 * np.arange(12), np.zeros(12)])
     assert not stray_points(np.concatenate([fine, coarse])).any()
+
+
+def test_points_apart_that_lie_on_a_known_surface_are_no_strays() -> None:
+    known = dome(1500)
+    near = known[0] + 0.02 * np.random.default_rng(1).normal(size=(600, 3))
+    near /= np.linalg.norm(near, axis=1, keepdims=True)  # a close-up, and three places elsewhere
+    landmarks = known[np.linalg.norm(known - known[0], axis=1) > 1][:3]
+    picked = PointCloud(np.concatenate([near, landmarks, [[9.0, 0, 0]]]))
+    uv = np.zeros((len(picked.points), 2))
+    assert np.isnan(unmapped(picked, uv)[-4:, 0]).all()
+    assert_array_equal(np.flatnonzero(np.isnan(unmapped(picked, uv, known)[:, 0])), [len(uv) - 1])
+    moved = 1.5 * known[:5]
+    found = are_near(known, np.concatenate([known[:5], moved, [[1e300] * 3]]))
+    assert_array_equal(found, [True] * 5 + [False] * 6)
