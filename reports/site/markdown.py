@@ -13,7 +13,17 @@ from reports.tables import formats
 from reports.tables import suites as tables
 from reports.tables.notes import load_notes, version_notes
 
-TOLD = ("methods", "overall", "success", "conformality", "published", "kinds", "cuts", "seeds")
+TOLD = (
+    "methods",
+    "bakes",
+    "overall",
+    "success",
+    "conformality",
+    "published",
+    "kinds",
+    "cuts",
+    "seeds",
+)
 """Names of the tables on the page, of those that a suite has."""
 LONG = frozenset({"conformality", "cuts"})
 """Those with a value for every method on every model."""
