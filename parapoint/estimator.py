@@ -189,7 +189,7 @@ class Estimator(ABC):
         surface, left_out = fitted_rows(surface_or_array(points))
         shape = checked_dimension(surface)
         parts = parts_of(surface, self.components)
-        fitted = fitted_side_by_side(self.fit_part, parts, session)
+        fitted = fitted_side_by_side(self.fit_part, parts, session, whole=self.components == "each")
         self.fitted_ = dataclasses.replace(fitted, report=fitted.report | left_out | shape)
         return self
 

@@ -53,6 +53,7 @@ class Fitted:
         points: (n, 3) the points that the map was fitted to, in the surface's unit.
         trace: states on the way, where there were any.
         report: settings and what was found, for tables and `model.json`.
+        missed: (m, 3) points that are not on the surface that was found, in the surface's unit.
     """
 
     map: SurfaceMap
@@ -60,6 +61,7 @@ class Fitted:
     points: FloatArray
     trace: tuple[TracePoint, ...]
     report: dict[str, object]
+    missed: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
 
     def flatten(self, points: FloatArray) -> FloatArray:
         """(N, 3) points → (N, 2) points of the plane, both in the surface's unit."""

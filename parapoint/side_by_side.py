@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,11 +11,15 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from parapoint.errors import InputError
 from parapoint.fitting import Fitted, Session, Strategy, SurfaceMap, placed
+from parapoint.surfaces.components import FEWEST, components
 from parapoint.surfaces.frame import IDENTITY, Frame
 from parapoint.surfaces.parameterization import Charted, Parameterization
 from parapoint.surfaces.preparation import shelves
-from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, Surface
+from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, PointCloud, Surface
+
+logger = logging.getLogger("parapoint")
 
 GAP = 0.02
 """Least distance between neighbouring charts, in widths of the widest."""
@@ -117,24 +122,56 @@ def joined(parts: Sequence[Charted]) -> Charted:
     )
 
 
-def fitted_side_by_side(strategy: Strategy, parts: Sequence[Surface], session: Session) -> Fitted:
+def fitted_side_by_side(
+    strategy: Strategy, parts: Sequence[Surface], session: Session, *, whole: bool = False
+) -> Fitted:
     """The map of one part of a surface, or those of several parts side by side.
 
     Of the points and the time each part has the share that its size is of all.
 
+    Args:
+        strategy: finds the map of a part.
+        parts: the parts.
+        session: what accompanies the fit.
+        whole: what is not on the surface that was found of a cloud becomes further parts, where it
+            has the points of one; it stays unmapped where no map of it is found.
+
     Raises:
         InputError: the strategy cannot be fitted to a part.
     """
-    if len(parts) == 1:
-        return strategy(parts[0], 1.0, session)
     sizes = [len(part.vertices if isinstance(part, Mesh) else part.points) for part in parts]
-    made = []
-    for number, (part, size) in enumerate(zip(parts, sizes, strict=True)):
-        own = session.of_component(number)
-        made.append(strategy(part, size / sum(sizes), own))
-        if own.checkpoint is not None and own.checkpoint.is_dir():
+    waiting, made = list(parts), list[Fitted]()
+    while waiting:
+        part, number = waiting.pop(0), len(made)
+        own = session if len(parts) == 1 and not made else session.of_component(number)
+        size = len(part.vertices if isinstance(part, Mesh) else part.points)
+        try:
+            found = strategy(part, min(1.0, size / sum(sizes)), own)
+        except (InputError, RuntimeError) as error:
+            if number < len(parts):
+                raise
+            logger.warning("%d points stay without a map: %s", size, error)
+            continue
+        made.append(found)
+        if own is not session and own.checkpoint is not None and own.checkpoint.is_dir():
             own.checkpoint.rmdir()
-    return side_by_side(made)
+        if whole and isinstance(part, PointCloud) and (left := _left_of(part, found)):
+            logger.warning(
+                "these make %d further component%s: each is fitted",
+                len(left),
+                "s" * (len(left) > 1),
+            )
+            waiting += left
+    return made[0] if len(made) == 1 else side_by_side(made)
+
+
+def _left_of(part: PointCloud, found: Fitted) -> list[Surface]:
+    """The parts that the points of a cloud make which are not on the surface that was found."""
+    if len(found.missed) < FEWEST:
+        return []
+    near, away = (cKDTree(of).query(part.points)[0] for of in (found.points, found.missed))
+    left = components(part.chosen(away < near))
+    return [one for one in left if isinstance(one, PointCloud) and len(one.points) >= FEWEST]
 
 
 def side_by_side(parts: Sequence[Fitted]) -> Fitted:
@@ -165,6 +202,7 @@ def side_by_side(parts: Sequence[Fitted]) -> Fitted:
         "components": len(parts),
         "seconds": round(sum(float(str(of["seconds"])) for of in reports), 3),
     }
-    if "iterations" in report:
-        report["iterations"] = sum(int(str(of["iterations"])) for of in reports)
+    for name in ("iterations", "anchors", "missed"):
+        if name in report:
+            report[name] = sum(int(str(of[name])) for of in reports)
     return Fitted(whole, IDENTITY, points, parts[0].trace, report)

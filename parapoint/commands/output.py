@@ -123,9 +123,9 @@ def write(
         facts["unmapped_rows"] = surface.rows_of(nowhere[:NAMED]).tolist()
         write_points(out, surface, uv)
     else:
-        missed = int(str(model.report_.get("missed", 0)))
-        near = int(are_near(charted.mesh.vertices, points).sum())
-        on = min(near, len(points) - missed)
+        on = int(are_near(charted.mesh.vertices, points).sum())
+        if model.components != "each":  # otherwise what one map misses another one has
+            on = min(on, len(points) - int(str(model.report_.get("missed", 0))))
         facts |= {"mapped_points": on, "unmapped_points": len(points) - on}
         facts |= {"faces": len(charted.mesh.faces), "texture": size}
         pixels = checkerboard(pixels=max(1, size // 32))

@@ -138,7 +138,9 @@ class ComputedMap(Estimator):
             "cut_short": cut_short,
             "seconds": round(clock.worked() - begun, 3),
         }
-        return Fitted(held, drawn.frame, _on_surface(drawn), (), report)
+        is_on = _is_on_surface(drawn)
+        on, off = drawn.points[is_on], drawn.points[~is_on]
+        return Fitted(held, drawn.frame, on, (), report, off)
 
 
 class _Drawn(NamedTuple):
@@ -157,13 +159,12 @@ class _Drawn(NamedTuple):
     flat: FlatMap
 
 
-def _on_surface(drawn: _Drawn) -> FloatArray:
-    """(n, 3) the drawn points but those that are not on the surface that was found."""
+def _is_on_surface(drawn: _Drawn) -> BoolArray:
+    """(n,) whether each of the drawn points is on the surface that was found."""
     if len(drawn.flat.missed) == 0:
-        return drawn.points
+        return np.ones(len(drawn.points), dtype=bool)
     missed = cKDTree(drawn.cloud[drawn.flat.missed])
-    is_on: BoolArray = missed.query(drawn.frame.inside(drawn.points))[0] > COINCIDENT
-    return drawn.points[is_on]
+    return np.asarray(missed.query(drawn.frame.inside(drawn.points))[0] > COINCIDENT)
 
 
 def _rows_of(missing: FloatArray, frame: Frame, surface: Surface) -> str:

@@ -1,9 +1,12 @@
 """A fitted map and several beside one another, with maps known by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from parapoint import ComputedMap
 from parapoint.fitting import Fitted, Progress, Session
 from parapoint.side_by_side import GAP, fitted_side_by_side, joined, side_by_side
 from parapoint.surfaces.frame import Frame
@@ -153,3 +156,54 @@ def test_a_session_is_told_nothing_by_default_and_compares_without_points():
     Session().tell(Progress("training"))
     assert Session(watched=SQUARE) == Session(watched=2 * SQUARE)
     assert Session().of_component(3).checkpoint is None
+
+
+def test_what_one_map_misses_gets_maps_of_its_own(caplog):
+    # Each part misses its last 120 points, as long as it has more; what has 110 fails.
+    told = []
+
+    def strategy(part, share, session):
+        told.append((len(part.points), round(share, 6), session.checkpoint))
+        if len(part.points) == 110:
+            raise RuntimeError("shows no surface")
+        count = len(part.points) - 120 if len(part.points) > 300 else len(part.points)
+        of = fitted(part.points[:count])
+        return replace(of, missed=part.points[count:])
+
+    far = np.repeat(np.arange(3), [400, 120, 110])[:, None] * np.array([50.0, 0, 0])
+    points = np.random.default_rng(0).random((630, 3)) * [1, 1, 0] + far
+    apart = [PointCloud(points[:520]), PointCloud(points[520:])]
+    with pytest.raises(RuntimeError, match="no surface"):  # a part that was asked for
+        fitted_side_by_side(strategy, apart, Session(), whole=True)
+    told.clear()
+    made = fitted_side_by_side(strategy, [PointCloud(points[:520])], Session(), whole=True)
+    assert told == [(520, 1.0, None), (120, round(120 / 520, 6), None)]
+    assert len(made.points) == 520
+    assert "these make 1 further component: each is fitted" in caplog.messages
+    told.clear()
+    one = fitted_side_by_side(strategy, [PointCloud(points[:520])], Session())
+    assert (len(told), len(one.points)) == (1, 400)
+
+    def misses(part, share, session):  # the rest has 110 points, of which no map is found
+        found = strategy(part, share, session)
+        return replace(found, points=part.points[:-110], missed=part.points[-110:])
+
+    caplog.clear()
+    made = fitted_side_by_side(misses, [PointCloud(points[400:])], Session(), whole=True)
+    assert len(made.points) == 120
+    assert caplog.messages[-1] == "110 points stay without a map: shows no surface"
+
+
+def test_crowns_close_above_the_ground_are_mapped_with_each_component(caplog):
+    rng = np.random.default_rng(0)
+    points = [np.column_stack([25 * rng.random((600, 2)), np.zeros(600)])]
+    for middle in ([7, 7, 2.9], [17, 15, 2.9]):
+        away = rng.normal(size=(250, 3))
+        points.append(1.5 * away / np.linalg.norm(away, axis=1, keepdims=True) + middle)
+    cloud = np.concatenate(points)
+    model = ComputedMap(components="each").fit(cloud)
+    mesh, own = model.mesh()
+    assert len(mesh.vertices) == len(cloud)
+    assert own.charts().max() == 2
+    assert "500 of 1100 points are not on the surface that was found" in caplog.text
+    assert "these make 2 further components: each is fitted" in caplog.text
