@@ -41,7 +41,7 @@ def cap(degrees: float, axis: int = 2, sign: float = 1.0) -> tuple[np.ndarray, n
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-@pytest.mark.parametrize("degrees", [40.0, 90.0, 150.0, 180.0])
+@pytest.mark.parametrize("degrees", [25.0, 90.0, 150.0, 180.0])
 def test_the_outer_side_is_where_a_surface_bulges(degrees, axis, sign) -> None:
     points, outer = cap(degrees, axis, sign)
     for moved in (points, 1e-6 * points + 5e5):
@@ -61,7 +61,7 @@ def test_the_outer_side_is_where_a_surface_bulges(degrees, axis, sign) -> None:
     ],
 )
 def test_a_flat_surface_faces_up(towards, up) -> None:
-    bowl, facing = cap(20.0)  # a hollow as deep as 9 % of its width is flat
+    bowl, facing = cap(15.0)  # a hollow as deep as 7 % of its width is flat
     normal = np.array(towards) / np.linalg.norm(towards)
     side = np.linalg.svd(normal[None])[2][1:]
     turned = np.column_stack([*side, normal]) if np.linalg.det([*side, normal]) > 0 else None
