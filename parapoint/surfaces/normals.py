@@ -7,6 +7,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
+from parapoint.surfaces.frame import power_of_two
 from parapoint.surfaces.surface import FloatArray, Mesh, Surface, vertex_normals
 
 AGREEING = 0.5
@@ -57,11 +58,14 @@ def are_outer(surface: Surface, points: FloatArray, normals: FloatArray) -> bool
         points: (N, 3) points on it.
         normals: (N, 3) unit normals at these, oriented alike.
     """
+    unit = power_of_two(points)  # in which areas are no larger or smaller than float64
+    points = points / unit
     if isinstance(surface, Mesh):
-        near = cKDTree(surface.vertices).query(points)[1]
-        return bool((vertex_normals(surface)[near] * normals).sum() >= 0)
+        mesh = Mesh(surface.vertices / unit, surface.faces)
+        near = cKDTree(mesh.vertices).query(points)[1]
+        return bool((vertex_normals(mesh)[near] * normals).sum() >= 0)
     if surface.normals is not None:
-        near = cKDTree(surface.points).query(points)[1]
+        near = cKDTree(surface.points / unit).query(points)[1]
         cosine = float((surface.normals[near] * normals).sum(axis=1).mean())
         if abs(cosine) >= AGREEING:
             return cosine > 0
