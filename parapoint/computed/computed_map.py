@@ -28,7 +28,7 @@ from parapoint.surfaces.sampling import (
     without_coincident,
 )
 from parapoint.surfaces.strays import named
-from parapoint.surfaces.surface import BoolArray, FloatArray, PointCloud, Surface, vertex_normals
+from parapoint.surfaces.surface import BoolArray, FloatArray, PointCloud, Surface, unit_normals
 
 logger = logging.getLogger("parapoint")
 
@@ -179,8 +179,9 @@ def _rows_of(missing: FloatArray, frame: Frame, surface: Surface) -> str:
 def _outer_side_up(flat: FlatMap, drawn: _Drawn, surface: Surface) -> FlatMap:
     """The map as seen from the outer side of the surface."""
     mesh = flat.charted.mesh
-    at = drawn.frame.outside(mesh.vertices)
-    return flat if are_outer(surface, at, vertex_normals(mesh)) else flat.turned()
+    at = drawn.frame.outside(mesh.vertices[mesh.faces].mean(axis=1))
+    normals = mesh.face_areas[:, None] * unit_normals(mesh.vertices, mesh.faces)
+    return flat if are_outer(surface, at, normals) else flat.turned()
 
 
 def _computed(surface: Surface, count: int, of: ComputedMap, deadline: float, say: Say) -> _Drawn:

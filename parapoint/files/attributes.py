@@ -27,6 +27,8 @@ COLOUR_COLUMNS = (
 BRIGHT = 16
 """Floats under the name of a colour are meant from 0 to 255 where one of them is over this. Those
 that are over 1 and not over this may as well be fractions that are too bright."""
+ROUNDED = 1e-5
+"""Fractions are over 1 by no more than this where single precision has rounded them."""
 INTENSITIES = {"intensity", "scalar_intensity", "reflectance", "scalar_reflectance"}
 """Names under which the strength of a scanner's echo stands, in lower case."""
 
@@ -90,8 +92,12 @@ def colours_of(values: npt.NDArray[Any]) -> npt.NDArray[Any] | None:
     """(P, 3 or 4) numbers of any type as colours (see `PointCloud`); None where they are none.
 
     Numbers of 16 bits none of which is over 255 are of 8 bits; so are whole floats over 1. Where
-    some are NaN, as of points without a colour, all are fractions.
+    some are not finite, as of points without a colour, these are NaN and all are fractions.
     """
+    if values.dtype.kind == "f":
+        values = np.where(np.isfinite(values), values, np.nan)
+        if _range(values)[1] <= 1 + ROUNDED:
+            values = np.minimum(values, 1)
     least, most = _range(values)
     if not (least >= 0 and most <= 65535):
         return None

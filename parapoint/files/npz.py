@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from parapoint.errors import InputError
 from parapoint.files.attributes import named_colours
 from parapoint.files.content import Content, points_content
 from parapoint.files.decoding import opened_archive
+
+logger = logging.getLogger("parapoint")
 
 
 def npz(data: bytes) -> Content:
@@ -40,9 +43,14 @@ def npz(data: bytes) -> Content:
     if "uv" in arrays and "uv" not in others:
         raise InputError(f"has {len(np.atleast_1d(arrays['uv']))} uv rows for {len(points)} points")
     del others["points"]
-    if "colours" not in others and (colours := _colours(others.get("colors"), len(points))):
-        del others["colors"]
+    name = "colours" if "colours" in others else "colors"
+    if name in others and (colours := _colours(others[name], len(points))):
+        del others[name]
         others |= colours
+    for name, of in list(others.items()):
+        if of.dtype.kind not in "biuf" or of.ndim > 2:
+            logger.warning("the array %r left out: it has no numbers of shape (n,) or (n, k)", name)
+            del others[name]
     return points_content(points, normals, others)
 
 

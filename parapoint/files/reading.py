@@ -371,7 +371,7 @@ def warn_of_dropped(path: Path, dropped: int, count: int) -> None:
 
 
 def _point_cloud(content: Content, path: Path) -> PointCloud:
-    """The finite points, with normals where all of them have one."""
+    """The finite points, with their normals, which are 0 where they are not finite."""
     finite: BoolArray = np.asarray(np.isfinite(content.vertices).all(axis=1))
     if not finite.any():
         raise InputError(

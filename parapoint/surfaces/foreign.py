@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,15 @@ from scipy import sparse
 from parapoint.errors import InputError
 from parapoint.surfaces.surface import Mesh, PointCloud, Surface
 
+logger = logging.getLogger("parapoint")
+
 
 def surface_or_array(given: Any) -> Surface | npt.NDArray[Any]:
     """What any library holds as a surface, as ours; what is an array of any kind, as NumPy's.
 
     Known by what they offer: `vertices` with `faces` (trimesh) or `triangles` (Open3D) make a mesh,
-    `vertices` or `points` alone a cloud, with `colors` and `normals` where there is one a point.
+    `vertices` or `points` alone a cloud, with `colors` and `normals` where there is one a point;
+    points that are not finite are dropped.
     A tensor may lie on any device and belong to a graph.
 
     Raises:
@@ -36,8 +40,21 @@ def surface_or_array(given: Any) -> Surface | npt.NDArray[Any]:
     at = np.asarray(points)
     normals = np.asarray(getattr(given, "normals", ()))
     colours = np.asarray(getattr(given, "colors", ()))
-    attributes = {"colours": colours[:, :3]} if len(colours) == len(at) else {}
-    return PointCloud(at, normals if len(normals) == len(at) else None, attributes=attributes)
+    finite = np.isfinite(at).all(axis=1) if at.ndim == 2 and at.dtype.kind == "f" else None
+    if finite is None or not len(at) or not finite.any():
+        return PointCloud(at)  # which says what is wrong with it
+    if dropped := int((~finite).sum()):
+        logger.warning("dropped %d of %d points: not finite", dropped, len(at))
+    known = None
+    if len(normals) == len(at):
+        known = np.where(np.isfinite(normals).all(axis=1, keepdims=True), normals, 0.0)[finite]
+    attributes = {}
+    if len(colours) == len(at):
+        if colours.dtype.kind == "f":  # single precision rounds 1 to a little more
+            colours = np.where((colours > 1) & (colours < 1 + 1e-5), 1.0, colours)
+        attributes["colours"] = colours[finite, :3]
+    rows = np.flatnonzero(finite) if dropped else None
+    return PointCloud(at[finite], known, dropped, attributes, rows)
 
 
 def _dense(given: Any) -> npt.NDArray[Any]:

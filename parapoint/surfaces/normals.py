@@ -17,6 +17,10 @@ BULGING = 0.25
 """A surface bulges if its points lie in front of their middle by at least this share of their
 distance from it, in the mean: half of a ball by 1, a cap of 20 degrees by 0.25. Two scans by a
 depth camera, of a carton and of a person, do by 0.40 and 0.26, towards the camera."""
+OPEN = 0.5
+"""A surface that faces all ways has a mean normal shorter than this: half a ball one of 0.5, a tube
+or a closed surface none. Where it is thin it bulges little, but as surely: it need only do so as
+seen from any place along the mean normal, and not from its middle alone."""
 UPRIGHT = 0.5
 """A flat surface faces along the first of z, y and x in which its mean normal has at least this
 share of its largest coordinate."""
@@ -56,29 +60,46 @@ def are_outer(surface: Surface, points: FloatArray, normals: FloatArray) -> bool
     Args:
         surface: what the points are of.
         points: (N, 3) points on it.
-        normals: (N, 3) unit normals at these, oriented alike.
+        normals: (N, 3) normals at these, oriented alike, as long as much of the surface is theirs.
     """
     unit = power_of_two(points)  # in which areas are no larger or smaller than float64
     points = points / unit
     if isinstance(surface, Mesh):
         mesh = Mesh(surface.vertices / unit, surface.faces)
-        near = cKDTree(mesh.vertices).query(points)[1]
-        return bool((vertex_normals(mesh)[near] * normals).sum() >= 0)
-    if surface.normals is not None:
-        near = cKDTree(surface.points / unit).query(points)[1]
-        cosine = float((surface.normals[near] * normals).sum(axis=1).mean())
+        cosine = _agreement(normals, vertex_normals(mesh)[cKDTree(mesh.vertices).query(points)[1]])
+        if abs(cosine) > 0:
+            return cosine > 0
+    elif surface.normals is not None:
+        known = surface.normals[cKDTree(surface.points / unit).query(points)[1]]
+        cosine = _agreement(normals, known)
         if abs(cosine) >= AGREEING:
             return cosine > 0
     return _bulge_or_face_up(points, normals)
 
 
+def _agreement(normals: FloatArray, known: FloatArray) -> float:
+    """The mean cosine of normals (N, 3) with known ones of any length; 0 where none has one."""
+    length = np.linalg.norm(known, axis=1)
+    weight = np.where(length > 0, np.linalg.norm(normals, axis=1), 0.0)
+    along = (normals * known).sum(axis=1) / np.where(length > 0, length, 1.0)
+    return float(along[length > 0].sum() / max(weight.sum(), 1e-300))
+
+
 def _bulge_or_face_up(points: FloatArray, normals: FloatArray) -> bool:
     """Whether normals (N, 3) that are oriented alike are on the side that bulges, or face up."""
-    away = points - points.mean(axis=0)
-    bulge = float((away * normals).sum(axis=1).mean())
-    if abs(bulge) >= BULGING * np.linalg.norm(away, axis=1).mean():
+    weight = np.linalg.norm(normals, axis=1)
+    weight /= weight.sum()
+    normals = normals / np.linalg.norm(normals, axis=1).sum()
+    away = points - weight @ points
+    along = (away * normals).sum(axis=1)
+    bulge, reach = float(along.sum()), float(weight @ np.linalg.norm(away, axis=1))
+    mean = normals.sum(axis=0)
+    faces_all_ways = bool(np.linalg.norm(mean) < OPEN)
+    if abs(bulge) >= BULGING * reach or (
+        faces_all_ways and abs(bulge) > float(weight @ np.abs(away @ mean))
+    ):
         return bulge > 0
-    upwards = normals.mean(axis=0)[::-1]
+    upwards = mean[::-1]
     first = int((np.abs(upwards) >= UPRIGHT * np.abs(upwards).max()).argmax())
     return bool(upwards[first] >= 0)
 

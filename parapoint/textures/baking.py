@@ -16,7 +16,7 @@ from parapoint.files.attributes import unit_colours
 from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.surface import FloatArray, Mesh, PointCloud, Surface
-from parapoint.textures.known import facing_outwards, knowing
+from parapoint.textures.known import check_bakeable, facing_outwards, knowing
 from parapoint.textures.scattered import Scattered
 from parapoint.textures.tangents import in_tangent_space
 from parapoint.textures.texels import Texels, texels
@@ -127,8 +127,8 @@ def baked(
 ) -> Baked:
     """The texture of a mesh with what is known at the points of a cloud of the same surface.
 
-    Points without a value have no say: colours and intensities that are not finite, normals of
-    length 0. Normals are turned to the outside of the mesh where that is not their side.
+    Points around the mesh have a say if they have a value: finite colours and intensities, normals
+    with a length. Normals are turned to the outside of the mesh where that is not their side.
 
     "colour" is 8-bit sRGB as the cloud has it. "normal" is an 8-bit tangent-space normal map as
     glTF has it (MikkTSpace tangents, green upwards). "intensity" is 16-bit grey from the least to
@@ -147,12 +147,28 @@ def baked(
     Raises:
         InputError: the cloud has not what the map shows; the map leaves the unit square.
     """
-    cloud = knowing(cloud, kind)
+    check_bakeable(cloud, kind)
     check_in_square(charted)
+    cloud = knowing(_around(charted.mesh, cloud), kind)
     shown = texels(charted, size)
     return {"colour": _colour, "normal": _normal, "position": _position, "intensity": _intensity}[
         kind
     ](shown, cloud, margin, done)
+
+
+def _around(mesh: Mesh, cloud: PointCloud) -> PointCloud:
+    """The points that lie in the box of a mesh, made wider by APART of its diagonal.
+
+    Raises:
+        InputError: none do.
+    """
+    corners = mesh.vertices[mesh.referenced]
+    reach = APART * np.linalg.norm(np.ptp(corners, axis=0))
+    low, high = corners.min(axis=0) - reach, corners.max(axis=0) + reach
+    near = ((cloud.points >= low) & (cloud.points <= high)).all(axis=1)
+    if not near.any():
+        raise InputError("does not lie on the surface of the model")
+    return cloud if near.all() else cloud.chosen(near)
 
 
 def _colour(shown: Texels, cloud: PointCloud, margin: int, done: Done) -> Baked:
@@ -171,10 +187,9 @@ def _intensity(shown: Texels, cloud: PointCloud, margin: int, done: Done) -> Bak
 
 
 def _position(shown: Texels, cloud: PointCloud, margin: int, done: Done) -> Baked:
-    points = _around(shown.charted.mesh, cloud.points)
-    surface = Scattered(points, points)
-    corner = points.min(axis=0)
-    span = max(float(np.ptp(points, axis=0).max()), 1e-300)
+    surface = Scattered(cloud.points, cloud.points)
+    corner = cloud.points.min(axis=0)
+    span = max(float(np.ptp(cloud.points, axis=0).max()), 1e-300)
     flat = painted(shown, 3, np.uint16, lambda at, _: 65535 * (surface(at) - corner) / span, done)
     alpha = np.zeros(shown.size**2, dtype=np.uint16)
     alpha[shown.places[shown.inside]] = 65535
@@ -187,25 +202,11 @@ def _position(shown: Texels, cloud: PointCloud, margin: int, done: Done) -> Bake
     return Baked(pixels, text, _fill(shown))
 
 
-def _around(mesh: Mesh, points: FloatArray) -> FloatArray:
-    """The points (N, 3) that lie in the box of a mesh, made wider by APART of its diagonal.
-
-    Raises:
-        InputError: none do.
-    """
-    corners = mesh.vertices[mesh.referenced]
-    reach = APART * np.linalg.norm(np.ptp(corners, axis=0))
-    low, high = corners.min(axis=0) - reach, corners.max(axis=0) + reach
-    near = ((points >= low) & (points <= high)).all(axis=1)
-    if not near.any():
-        raise InputError("does not lie on the surface of the model")
-    return np.asarray(points[near])
-
-
 def _normal(shown: Texels, cloud: PointCloud, margin: int, done: Done) -> Baked:
     cloud = facing_outwards(cloud, shown.charted.mesh)
     assert cloud.normals is not None
-    known = Scattered(cloud.points, cloud.normals)
+    length = np.linalg.norm(cloud.normals, axis=1, keepdims=True)
+    known = Scattered(cloud.points, cloud.normals / length)
     seen_from = in_tangent_space(shown)
 
     def values(at: FloatArray, rows: slice) -> FloatArray:

@@ -18,6 +18,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from parapoint import ComputedMap, InputError, Mesh, NotFittedError, ParaPoint, PointCloud
 from parapoint.estimator import load
+from parapoint.surfaces.foreign import surface_or_array
 
 FEW = "it fits 30 points at most; a surface needs 100"
 COLUMNS = "it fits points of other than three coordinates"
@@ -160,6 +161,19 @@ def test_surfaces_of_other_libraries_are_taken() -> None:
     tensor = torch.tensor(vertices, requires_grad=True)
     for cloud in (trimesh.PointCloud(vertices), open3d_cloud, tensor):
         np.testing.assert_array_equal(ComputedMap().fit(cloud).transform(cloud), bare)
+
+
+def test_points_of_other_libraries_that_are_not_finite_are_dropped(caplog) -> None:
+    points = np.array([[0.0, 0, 0], [np.nan, 0, 0], [1, 0, 0], [0, 1, 0]])
+    normals = np.array([[0.0, 0, 1], [0, 0, 1], [np.nan] * 3, [0, 0, 1]])
+    colours = np.array([[1.0000001, 0, 0], [0, 0, 0], [0, 0.5, 0], [0, 0, 1]])
+    cloud = surface_or_array(SimpleNamespace(points=points, normals=normals, colors=colours))
+    assert isinstance(cloud, PointCloud)
+    assert cloud.normals is not None
+    assert cloud.normals[:, 2].tolist() == [1, 0, 1]
+    assert cloud.attributes["colours"].tolist() == [[1, 0, 0], [0, 0.5, 0], [0, 0, 1]]
+    assert cloud.rows_of(np.arange(3)).tolist() == [0, 2, 3]
+    assert caplog.messages == ["dropped 1 of 4 points: not finite"]
 
 
 @pytest.mark.parametrize(

@@ -194,15 +194,29 @@ def test_colours_of_no_known_range_are_told_and_kept_apart(
     ],
 )
 def test_npz_colours_go_by_either_spelling(values, expected, tmp_path) -> None:
-    np.savez(tmp_path / "a.npz", points=POINTS, colors=values)
-    attributes = read_surface(tmp_path / "a.npz").attributes
-    assert list(attributes) == ["colours"]
-    assert np.array_equal(attributes["colours"], expected)
+    for name in ("colors", "colours"):
+        np.savez(tmp_path / "a.npz", points=POINTS, **{name: values})
+        attributes = read_surface(tmp_path / "a.npz").attributes
+        assert list(attributes) == ["colours"]
+        assert np.array_equal(attributes["colours"], expected)
     for name in ("colors", "colours"):
         arrays = {"vertices": POINTS, "faces": [[0, 1, 2]], name: values}
         np.savez(tmp_path / "b.npz", **arrays)
         mesh = read_polygons(tmp_path / "b.npz")
         assert np.array_equal(mesh.colours, expected)
+
+
+def test_npz_arrays_that_are_no_numbers_of_points_are_left_out(tmp_path, caplog) -> None:
+    others = {
+        "labels": np.array(list("abcd")),
+        "days": np.array(["2026-01-01"] * 4, dtype="datetime64[D]"),
+        "frames": np.zeros((4, 3, 3)),
+        "waves": np.zeros(4, dtype=complex),
+    }
+    np.savez(tmp_path / "a.npz", points=POINTS, height=POINTS[:, 2], **others)
+    assert list(read_surface(tmp_path / "a.npz").attributes) == ["height"]
+    for name in others:
+        assert f"the array '{name}' left out: it has no numbers" in caplog.text
 
 
 def test_npz_colours_that_are_none_keep_their_name(tmp_path, caplog) -> None:

@@ -77,7 +77,7 @@ def test_strips_are_triangles_of_which_every_second_is_turned(sizes, corners, tr
         (np.array([[0.0, 1.5, 2.0]]), None),
         (np.array([[-1, 0, 0]], dtype=np.int64), None),
         (np.array([[np.nan, np.nan, np.nan]]), None),
-        (np.array([[0.0, np.inf, 1.0]]), None),
+        (np.array([[0.0, 0.5, 1.001]]), None),
     ],
 )
 def test_colours_are_known_by_their_range(values, kind):
@@ -89,12 +89,18 @@ def test_colours_are_known_by_their_range(values, kind):
         assert_array_equal(found, values)
 
 
+def test_fractions_that_rounding_has_made_too_large_are_1():
+    found = colours_of(np.array([[0.0, 0.5, 1.000001]], dtype=np.float32))
+    assert found.tolist() == [[0.0, 0.5, 1.0]]
+
+
+@pytest.mark.parametrize("missing", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("most", [1.0, 255.0, 65535.0])
-def test_colours_of_some_points_are_fractions(most):
-    values = np.array([[0.0, 0.0, most], [np.nan] * 3, [most, 0.0, 0.0]])
+def test_colours_of_some_points_are_fractions(most, missing):
+    values = np.array([[0.0, 0.0, most], [missing] * 3, [most, 0.0, 0.0]])
     found = colours_of(values)
     assert found.dtype.kind == "f"
-    np.testing.assert_array_equal(found, values / most)
+    np.testing.assert_array_equal(found, np.where(np.isfinite(values), values, np.nan) / most)
     assert colours_of(values + [[0, 0.5, 0]] * 3 if most > 1 else values - 1) is None
 
 

@@ -87,3 +87,64 @@ def test_faces_tell_the_side() -> None:
         mesh = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [corners])
         up = np.tile([0.0, 0, 1], (3, 1))
         assert are_outer(mesh, mesh.vertices, up) == (corners[1] == 1)
+
+
+def torus(tube: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points of a ring of radius 1, and its outer normals."""
+    a, b = np.random.default_rng(2).uniform(0, 2 * np.pi, (2, 1500))
+    outer = np.stack([np.cos(a) * np.cos(b), np.sin(a) * np.cos(b), np.sin(b)], axis=1)
+    return np.stack([np.cos(a), np.sin(a), 0 * a], axis=1) + tube * outer, outer
+
+
+def pipe(radius: float, *, turn: float = 2 * np.pi) -> tuple[np.ndarray, np.ndarray]:
+    """Points of an open tube of length 2, and its outer normals; of less than a turn, a gutter."""
+    a, z = np.random.default_rng(3).uniform([[0], [-1]], [[turn], [1]], (2, 1500))
+    outer = np.stack([np.cos(a), np.sin(a), 0 * a], axis=1)
+    return radius * outer + z[:, None] * [0, 0, 1], outer
+
+
+def plate(thickness: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points of a closed plate of width 2, and its outer normals; its top holds nine of ten."""
+    rng = np.random.default_rng(4)
+    points = rng.uniform(-1, 1, (2000, 3)) * [1, 1, 0]
+    side = np.where(rng.random(2000) < 0.9, 1.0, -1.0)
+    outer = np.zeros((2000, 3))
+    outer[:, 2] = side / np.where(side > 0, 0.9, 0.1)  # as long as the area of each
+    points[:, 2] = side * thickness / 2
+    return points, outer
+
+
+@pytest.mark.parametrize(
+    ("points", "outer"),
+    [torus(0.3), torus(0.1), torus(0.02), pipe(0.5), pipe(0.02), pipe(0.1, turn=5), plate(0.02)],
+    ids=["ring", "thin ring", "hoop", "tube", "stick", "gutter", "plate"],
+)
+def test_the_outer_side_of_what_is_thin_is_its_outside(points, outer) -> None:
+    turn = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
+    for at, normals in ((points, outer), (points @ turn, outer @ turn), (1e-9 * points, outer)):
+        assert are_outer(PointCloud(at), at, normals)
+        assert not are_outer(PointCloud(at), at, -normals)
+
+
+def test_a_screw_has_no_outside_and_faces_up() -> None:
+    turn, radius = np.random.default_rng(6).uniform([[0], [0.1]], [[12], [1]], (2, 2000))
+    points = np.stack([radius * np.cos(turn), radius * np.sin(turn), turn / 3], axis=1)
+    up = np.stack([np.sin(turn) / 3, -np.cos(turn) / 3, radius], axis=1)
+    assert are_outer(PointCloud(points), points, up)
+    assert not are_outer(PointCloud(points), points, -up)
+
+
+@pytest.mark.parametrize("length", [1e-3, 1.0, 40.0])
+def test_known_normals_count_whatever_their_length(length) -> None:
+    points, outer = cap(180.0)
+    few = length * np.where(np.arange(len(points))[:, None] % 3 == 0, -outer, 0.0)
+    assert not are_outer(PointCloud(points, few), points, outer)
+    assert are_outer(PointCloud(points, 0 * outer), points, outer)
+
+
+def test_faces_that_are_there_twice_tell_nothing() -> None:
+    points, outer = cap(90.0)
+    faces = np.arange(len(points) // 3 * 3).reshape(-1, 3)
+    both = Mesh(points, np.concatenate([faces, faces[:, ::-1]]))
+    assert are_outer(both, points, outer)
+    assert not are_outer(both, points, -outer)

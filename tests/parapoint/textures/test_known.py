@@ -95,3 +95,18 @@ def test_a_stray_does_not_stretch_the_range_of_a_position_map(away) -> None:
     assert alone.text == beside.text
     with pytest.raises(InputError, match="does not lie on the surface"):
         baked(PLATE, PointCloud(far), "position", 32)
+
+
+def test_a_stray_does_not_stretch_the_range_of_intensities() -> None:
+    values = np.append(100 + POINTS[:, 0], 1e6)
+    points = np.concatenate([POINTS, [[2.0, 2.0, 50.0]]])
+    made = baked(PLATE, PointCloud(points, attributes={"intensity": values}), "intensity", 32)
+    assert float(made.text["intensity of white"]) == pytest.approx(104, abs=0.01)
+
+
+def test_normals_count_alike_whatever_their_length() -> None:
+    lengths = np.random.default_rng(1).uniform(0.01, 9, (2000, 1))
+    wanted = baked(PLATE, PointCloud(POINTS, UP), "normal", 32).pixels
+    assert np.array_equal(
+        baked(PLATE, PointCloud(POINTS, lengths * UP), "normal", 32).pixels, wanted
+    )
