@@ -36,8 +36,8 @@ FED = 0.35
 """Cuts are led to what has less than this part of its fair area, and are judged by it: above
 STARVED, so that a part is not just lifted over that bound."""
 LEAST_GAIN = 0.1
-"""A cut helps if one as long as sqrt(faces) edges, about once across the surface, would take away
-at least this share of the fault: 116 of the 120 cuts that help at all on thirteen models do."""
+"""A cut helps if it takes away at least this share of the fault for each sqrt(faces) of its edges,
+which lead about once across the surface: 116 of 120 cuts on thirteen models that help at all do."""
 TRIALS = 6
 """Times that no cut helps before what is starved is given up."""
 
