@@ -210,16 +210,13 @@ def test_a_sheet_keeps_its_holes_where_a_short_cut_feeds_a_part_of_it() -> None:
     assert 14 <= len(disk.vertices) - len(mesh.vertices) <= 20  # from the rim to the pin's tip
 
 
-@pytest.mark.parametrize(("balls", "seed"), [(1, 0), (2, 3)])
-def test_objects_on_a_floor_have_a_map_that_starves_nothing(balls, seed) -> None:
+def test_objects_on_a_floor_have_a_map_that_starves_nothing() -> None:
     # Where a ball touches the floor, the triangulation leaves a hole beside its foot.
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(3)
     points = [np.column_stack([rng.uniform(-1, 1, (1500, 2)), np.zeros(1500)])]
-    for side in (-1, 1)[:balls]:
+    for middle in ([-0.5, -0.3, 0.35], [0.5, 0.3, 0.35]):
         away = rng.normal(size=(577, 3))
-        away /= np.linalg.norm(away, axis=1, keepdims=True)
-        middle = np.array([0.5, 0.3, 0]) * side * (balls - 1) + np.array([0, 0, 0.35])
-        points.append(0.35 * away + middle)
+        points.append(0.35 * away / np.linalg.norm(away, axis=1, keepdims=True) + middle)
     flat = flattened(np.concatenate(points), distortion="balanced")
     assert len(flat.mesh.boundary_loops) > 1
     assert len(flat.disk.boundary_loops) == 1
