@@ -51,11 +51,11 @@ def thinned(
     for piece in pieces:
         check_bakeable(piece, kind)
         count += len(piece.points)
+        known = np.flatnonzero(has_value(piece, kind))
         if kind in SHOWN:
             values = piece.attributes[SHOWN[kind]]
             kinds.add(values.dtype)
-            has_shown |= bool(values.any())
-        known = np.flatnonzero(has_value(piece, kind))
+            has_shown |= bool(values[known].any())
         numbers, first = np.unique(cubes.of(piece.points[known]), return_index=True)
         fresh = np.append(taken, -1)[np.searchsorted(taken, numbers)] != numbers
         if fresh.any():

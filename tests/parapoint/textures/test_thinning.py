@@ -165,6 +165,11 @@ def test_what_is_0_at_all_points_was_never_taken(kind: str, name: str, message: 
     none = PointCloud(CORNERS, attributes={name: zeros})
     with pytest.raises(InputError, match=message):
         thinned([none, none], kind, SQUARE, 8)
+    unknown = np.where(np.arange(4)[:, None] == 1, np.nan, zeros.reshape(4, -1)).reshape(
+        zeros.shape
+    )
+    with pytest.raises(InputError, match=message):
+        thinned([PointCloud(CORNERS, attributes={name: unknown})], kind, SQUARE, 8)
     some = zeros.copy()
     some[3] = 1
     thinned([none, PointCloud(CORNERS, attributes={name: some})], kind, SQUARE, 8)
