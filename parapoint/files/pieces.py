@@ -18,6 +18,7 @@ from parapoint.files.reading import (
     unreadable,
     warn_of_dropped,
 )
+from parapoint.surfaces.normals import known_or_zero
 from parapoint.surfaces.surface import BoolArray, Mesh, PointCloud
 
 PIECE = 1_000_000
@@ -62,7 +63,6 @@ def point_pieces(path: str | Path) -> Iterator[PointCloud]:
 def _chosen(content: Content, rows: BoolArray) -> PointCloud:
     """Some points, with their normals, 0 where these are not finite."""
     normals = None if content.normals is None else content.normals[rows]
-    if normals is not None:
-        normals = np.where(np.isfinite(normals).all(axis=1, keepdims=True), normals, 0.0)
+    known = None if normals is None else known_or_zero(normals)
     attributes = {name: values[rows] for name, values in content.attributes.items()}
-    return PointCloud(content.vertices[rows], normals, attributes=attributes)
+    return PointCloud(content.vertices[rows], known, attributes=attributes)

@@ -32,6 +32,7 @@ from parapoint.files.meshes.ply import ply
 from parapoint.files.meshes.stl import stl
 from parapoint.files.npz import npz
 from parapoint.files.polygons import triangle_rows
+from parapoint.surfaces.normals import known_or_zero
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization
 from parapoint.surfaces.surface import (
     BoolArray,
@@ -384,7 +385,7 @@ def _point_cloud(content: Content, path: Path) -> PointCloud:
         known = np.asarray(np.isfinite(normals).all(axis=1))
         if not known.all():
             logger.warning("%s: normals that are not finite, left out: %d", path, (~known).sum())
-            normals = np.where(known[:, None], normals, 0.0) if known.any() else None
+            normals = known_or_zero(normals) if known.any() else None
     attributes = {name: values[finite] for name, values in content.attributes.items()}
     rows = content.rows
     if not finite.all():

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from scipy import sparse
 
 from parapoint.errors import InputError
+from parapoint.surfaces.normals import known_or_zero
 from parapoint.surfaces.surface import Mesh, PointCloud, Surface
 
 logger = logging.getLogger("parapoint")
@@ -47,7 +48,7 @@ def surface_or_array(given: Any) -> Surface | npt.NDArray[Any]:
         logger.warning("dropped %d of %d points: not finite", dropped, len(at))
     known = None
     if len(normals) == len(at):
-        known = np.where(np.isfinite(normals).all(axis=1, keepdims=True), normals, 0.0)[finite]
+        known = known_or_zero(normals)[finite]
     attributes = {}
     if len(colours) == len(at):
         if colours.dtype.kind == "f":  # single precision rounds 1 to a little more

@@ -50,6 +50,11 @@ def oriented_normals(points: FloatArray, neighbours: int = 12) -> FloatArray:
     return np.asarray(normals)
 
 
+def known_or_zero(normals: FloatArray) -> FloatArray:
+    """(N, 3) the normals, 0 where they are not finite: a normal of 0 is one that nobody knows."""
+    return np.where(np.isfinite(normals).all(axis=1, keepdims=True), normals, 0.0)
+
+
 def are_outer(surface: Surface, points: FloatArray, normals: FloatArray) -> bool:
     """Whether normals are on the outer side of a surface, which is seen when it is looked at.
 
