@@ -72,7 +72,8 @@ def fit(surface: str, out: str, preset: str, as_json: bool, **settings: Any) -> 
         logger.warning("%s", _how_to_go_on(out))
         raise
     facts = {"file": out, "faces": len(charted.mesh.faces), **found.facts(), **model.report_}
-    warn(facts, advice_of_cloud(model.time_budget, model.get_params()["distortion"]))
+    distortion = model.get_params()["distortion"]
+    warn(facts, advice_of_cloud(model.time_budget, distortion, model.components))
     if as_json:
         print(json.dumps({"model": out, "estimator": type(model).__name__, **facts}))
     else:

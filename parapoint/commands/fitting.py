@@ -88,9 +88,16 @@ def fitted(
                 time_budget=model.time_budget or FALLBACK_SECONDS,
                 components=model.components,
                 seed=model.seed,
+                **_asked(model, ("points", "distortion")),
             )
             return fit(stand_in)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     except RuntimeError as error:  # the training diverged
         raise click.ClickException(f"{path}: {error}") from error
+
+
+def _asked(model: Estimator, names: tuple[str, ...]) -> dict[str, Any]:
+    """The parameters of these names that are not as they are where nobody asks for them."""
+    given, own = model.get_params(), type(model)().get_params()
+    return {name: given[name] for name in names if given[name] != own[name]}

@@ -7,6 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from parapoint.commands.output import SIDES, TEXTURE
 from parapoint.commands.progress import Tell, baking, untold
 from parapoint.files.meshes.gltf import opened
@@ -37,8 +39,6 @@ REWRITTEN = {(".obj", ".obj"), (".ply", ".ply"), (".glb", ".glb"), (".gltf", ".g
 """Endings of an input and an output between which all but the UVs is kept."""
 WITHOUT_STRAYS = (".ply", ".glb")
 """Endings of files that are written with the vertices of faces alone."""
-CHECKER_FIELDS = 32
-"""Fields along a side of the checkerboard."""
 
 
 @dataclass(frozen=True)
@@ -125,9 +125,12 @@ class MeshOutput:
             chosen = self.painting if self.chosen is None else self.painting.of_faces(self.chosen)
             tints = self.source.suffix.lower() in {".glb", ".gltf"}
             return repainted(placed, chosen, self.texture, self.margin, tints=tints, done=done)
-        if self.given.colours is not None and self.chosen is None:
-            return coloured(placed, self.given.colours, self.texture, self.margin, done=done)
-        return checkerboard(CHECKER_FIELDS, max(1, self.texture // CHECKER_FIELDS))
+        colours = self.given.colours
+        if colours is not None:
+            if self.chosen is not None:
+                colours = colours[np.unique(self.given.mesh.faces[self.chosen])]
+            return coloured(placed, colours, self.texture, self.margin, done=done)
+        return checkerboard(self.texture)
 
     def write(self, placed: Charted, picture: Picture) -> dict[str, object]:
         """Write the mesh with its map in the unit square; facts of the writing."""
@@ -195,14 +198,17 @@ class MeshOutput:
         return next((out for given, out in REWRITTEN if given == own and self.chosen is None), "")
 
     def _warn_of_extras(self) -> None:
-        shown = {"old UVs", "colours"} if self.painting is not None else {"colours"}
+        shown = {"colours"} if self._gets_texture else set()
+        if shown and self.painting is not None:
+            shown.add("old UVs")
         left = [name for name in self.given.extras if name not in shown]
         if self.out.suffix.lower() in WITHOUT_STRAYS and not self.given.mesh.referenced.all():
             left.append("vertices without faces")
         if left:
             logger.warning(
-                "%s: positions, triangles, new UVs and colours are written; left out: %s%s",
+                "%s: positions, triangles and new UVs are written%s; left out: %s%s",
                 self.out,
+                ", what it shows in a texture" if shown & set(self.given.extras) else "",
                 ", ".join(left),
                 f". A {kept} file would keep them" if (kept := self._keeper) else "",
             )

@@ -19,7 +19,7 @@ from parapoint.surfaces.across_seams import Transform, edges_across_seam, opened
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.sampling import mean_spacing
 from parapoint.surfaces.strays import NAMED, are_near, far_from, named, unmapped
-from parapoint.surfaces.surface import BoolArray, Mesh, Surface
+from parapoint.surfaces.surface import BoolArray, Mesh, PointCloud, Surface
 from parapoint.textures.baking import MARGIN, baked
 from parapoint.textures.checkerboard import checkerboard
 from parapoint.textures.placing import BORDER, Placing
@@ -34,6 +34,8 @@ SIDES = {".obj": (".mtl", ".png"), ".ply": (".png",)}
 """Endings of the files beside a textured mesh."""
 TEXTURE = 2048
 """Texels along a side of a texture, if none were asked for."""
+Y_UP = (".obj", ".glb", ".gltf")
+"""Endings of files in which y is upwards by rule or by custom; in others it is z."""
 
 
 def target(out: str, inputs: list[str], *, force: bool, textured: bool) -> str:
@@ -76,6 +78,7 @@ def write(
     texture: int | None = None,
     margin: int | None = None,
     preview: Path | None = None,
+    is_y_up: bool = False,
     tell: Tell = untold,
     is_fitted: bool = True,
 ) -> dict[str, object]:
@@ -87,8 +90,10 @@ def write(
             theirs, or whose colours are baked into the texture of the model's mesh.
         out: the file.
         texture: texels along a side of a texture, or None; .glb has one always.
-        margin: texels around the map and its charts; 1 / 256 of the side if None.
+        margin: texels that stay free around the map, and that repeat the edge of each chart; if
+            None, 1 / 256 of the side and MARGIN.
         preview: a PNG file for a picture of the surface beside its layout, or None.
+        is_y_up: whether y points upwards in that picture, not z.
         tell: is called with each `Progress`.
         is_fitted: whether the surface is that which the model was fitted to.
     """
@@ -98,17 +103,13 @@ def write(
     size = texture or TEXTURE
     charted = model.mesh()
     placing = Placing.smallest(charted.map.uv, BORDER if margin is None else margin / size)
-    points = surface.vertices if isinstance(surface, Mesh) else surface.points
-    facts: dict[str, object] = {"file": out, "mapped_points": len(points)}
-    shown, pixels = placing.of(charted), checkerboard()
+    shown, pixels = placing.of(charted), checkerboard(size)
+    facts: dict[str, object] = {"file": out}
     if isinstance(surface, Mesh):
-        transform = _then(model.fitted_.flatten, placing)
-        uv = transform(points)
-        _warn_of_far(out, far_from(model.points_, points) & surface.referenced)
-        across = edges_across_seam(surface, uv, transform, mean_spacing(model.points_))
-        parameterization = opened(surface, uv, across)
-        facts["spanning_faces"] = int((parameterization.corners != surface.faces).any(1).sum())
-        shown = Charted(surface, parameterization)
+        shown = _mapped(model, surface, placing, out)
+        spanning = (shown.map.corners != surface.faces).any(1).sum()
+        facts |= {"mapped_points": len(surface.vertices), "spanning_faces": int(spanning)}
+        tell(Progress("writing"))
         if ending == ".npz":
             write_npz(out, shown)
         elif ending == ".ply" and texture is None:
@@ -117,29 +118,50 @@ def write(
             write_textured(out, shown, pixels)
     elif ending == ".npz" or (ending in {".ply", ".obj"} and texture is None):
         known = None if is_fitted else model.points_
-        uv = unmapped(surface, _then(model.transform, placing)(points), known)
+        uv = unmapped(surface, _then(model.transform, placing)(surface.points), known)
         nowhere = np.flatnonzero(np.isnan(uv[:, 0]))
-        facts |= {"mapped_points": len(uv) - len(nowhere), "unmapped_points": len(nowhere)}
+        facts |= _counted(len(uv), len(nowhere))
         facts["unmapped_rows"] = surface.rows_of(nowhere[:NAMED]).tolist()
+        tell(Progress("writing"))
         write_points(out, surface, uv)
     else:
-        on = int(are_near(charted.mesh.vertices, points).sum())
-        if model.components != "each":  # otherwise what one map misses another one has
-            on = min(on, len(points) - int(str(model.report_.get("missed", 0))))
-        facts |= {"mapped_points": on, "unmapped_points": len(points) - on}
-        facts |= {"faces": len(charted.mesh.faces), "texture": size}
-        pixels = checkerboard(pixels=max(1, size // 32))
+        facts |= _counted(len(surface.points), _off_mesh(model, surface))
+        facts["texture"] = size
         if "colours" in surface.attributes:
             texels = MARGIN if margin is None else margin
             made = baked(shown, surface, "colour", size, texels, done=baking(tell))
             pixels = made.pixels.astype(np.uint8, copy=False)
             facts["texture_fill"] = round(made.fill, 3)
+        tell(Progress("writing"))
         write_textured(out, shown, pixels)
-    tell(Progress("writing"))
     if preview is not None:
-        write_preview(preview, shown, pixels)
-    facts = {"faces": len(shown.mesh.faces)} | facts | quality(shown, size).facts()
+        write_preview(preview, shown, pixels, is_y_up=is_y_up)
+    tell(Progress("measuring"))
+    facts |= {"faces": len(shown.mesh.faces), **quality(shown, size).facts()}
     return facts | {"seconds": round(time.perf_counter() - begun, 3)}
+
+
+def _mapped(model: Estimator, mesh: Mesh, placing: Placing, out: str) -> Charted:
+    """A mesh with the model's map in the unit square, cut along the model's seam."""
+    transform = _then(model.fitted_.flatten, placing)
+    uv = transform(mesh.vertices)
+    _warn_of_far(out, far_from(model.points_, mesh.vertices) & mesh.referenced)
+    across = edges_across_seam(mesh, uv, transform, mean_spacing(model.points_))
+    return Charted(mesh, opened(mesh, uv, across))
+
+
+def _counted(count: int, missed: int) -> dict[str, object]:
+    """How many of some points have a place on the map, and how many have none, as facts."""
+    return {"mapped_points": count - missed, "unmapped_points": missed}
+
+
+def _off_mesh(model: Estimator, cloud: PointCloud) -> int:
+    """Points of a cloud that the mesh of the model leaves out, about: it is of some of them."""
+    far = int((~are_near(model.mesh().mesh.vertices, cloud.points)).sum())
+    if model.components == "each":  # what one map misses another one has
+        return far
+    missed, drawn = (int(str(model.report_.get(name, 0))) for name in ("missed", "points"))
+    return max(far, round(len(cloud.points) * missed / max(drawn, 1)))
 
 
 def _warn_of_far(out: str, is_far: BoolArray) -> None:

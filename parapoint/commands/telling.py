@@ -32,21 +32,24 @@ ADVICE_OF_MAPS = {
 """What helps where faces overlap, and where parts are starved."""
 
 
-def advice_of_cloud(time_budget: float | None, distortion: str | None) -> dict[str, str]:
+def advice_of_cloud(
+    time_budget: float | None, distortion: str | None, components: str
+) -> dict[str, str]:
     """What helps where a map of a cloud overlaps, and where it starves parts, as it was asked for.
 
     Args:
         time_budget: seconds that the fit might take, or None.
         distortion: what the map keeps, or None for the paper's training.
+        components: how many maps were asked for, one of COMPONENTS.
     """
     helps = ["more time"] * (time_budget is not None)
     helps += ["--distortion isometric"] * (distortion != "isometric")
     starved = " or ".join(helps) + " can help" if helps else "crop it to the part that matters"
-    overlap = (
-        "noise, strays or parts that only touch can be the cause: denoise it, crop it, or take "
-        "--components each"
-    )
-    return {"overlap": overlap, "starved": starved}
+    overlap = "denoise it, crop it, or take --components each"
+    if components == "each":
+        overlap = "denoise it or crop it"
+    cause = "noise, strays or parts that only touch can be the cause"
+    return {"overlap": f"{cause}: {overlap}", "starved": starved}
 
 
 def lines(facts: Facts) -> str:

@@ -13,7 +13,7 @@ import click
 
 from parapoint.commands.fitting import estimator_of, fitted
 from parapoint.commands.memory import memory_option
-from parapoint.commands.output import TEXTURE, preview_target, target, write
+from parapoint.commands.output import TEXTURE, Y_UP, preview_target, target, write
 from parapoint.commands.progress import Tell, bar
 from parapoint.commands.telling import Facts, advice_of_cloud, lines, warn
 from parapoint.errors import InputError
@@ -197,7 +197,7 @@ def _unwrap_mesh(given: Polygons, asked: Asked, tell: Tell) -> Facts:
         chosen=chosen,
     )
     output.check(force=asked.force)
-    border = BORDER if asked.margin is None else asked.margin / (asked.texture or TEXTURE)
+    border = BORDER if asked.margin is None else asked.margin / output.texture
     request = Request(
         method,
         border,
@@ -234,9 +234,10 @@ def _unwrap_cloud(given: PointCloud, asked: Asked, tell: Tell) -> Facts:
         texture=asked.texture,
         margin=asked.margin,
         preview=asked.preview,
+        is_y_up=Path(asked.surface).suffix.lower() in Y_UP,
         tell=tell,
     )
     facts |= model.report_
     facts["seconds"] = round(time.perf_counter() - begun, 3)
-    warn(facts, advice_of_cloud(asked.time_budget, asked.distortion))
+    warn(facts, advice_of_cloud(asked.time_budget, asked.distortion, asked.components))
     return facts

@@ -14,6 +14,7 @@ import numpy as np
 from parapoint import clock
 from parapoint.commands.given_seams import read_seams
 from parapoint.commands.mesh_output import MeshOutput
+from parapoint.commands.output import Y_UP
 from parapoint.commands.progress import Tell, untold
 from parapoint.commands.telling import ADVICE_OF_MESHES, warn
 from parapoint.errors import InputError
@@ -33,8 +34,6 @@ logger = logging.getLogger("parapoint")
 SECONDS_OF_A_FACE, GROWTH = 7e-5, 1.2
 """What unwrapping takes, for the progress bar: the first number times the faces to the power of the
 second gives the seconds of one idle core, 10 for 20,000 faces and 70 for 100,000."""
-Y_UP = (".obj", ".glb", ".gltf")
-"""Endings of files in which y is upwards by rule or by custom; in others it is z."""
 
 
 @dataclass(frozen=True)

@@ -75,7 +75,7 @@ class ComputedMap(Estimator):
         seed: of the draw of points.
     """
 
-    packages: ClassVar[tuple[str, ...]] = ("libigl", "scipy")
+    packages: ClassVar[tuple[str, ...]] = ("libigl", "scipy", "shapely")
 
     points: int = 20_000
     distortion: Distortion = "balanced"

@@ -13,6 +13,7 @@ import math
 
 import igl
 import numpy as np
+import shapely
 
 from parapoint import clock
 from parapoint.planar.embedding import FLATTEST, embedded_in_disk
@@ -87,10 +88,9 @@ def is_bijective(mesh: Mesh, uv: FloatArray) -> bool:
         return False
     start = np.concatenate(mesh.boundary_loops)
     end = np.concatenate([np.roll(loop, -1) for loop in mesh.boundary_loops])
-    low, high = np.minimum(uv[start], uv[end]), np.maximum(uv[start], uv[end])
-    meets = ((low[:, None] <= high) & (low <= high[:, None])).all(axis=2)
-    one, other = np.nonzero(np.triu(meets, 1))
-    apart = (start[one] != end[other]) & (end[one] != start[other])
+    segments = np.asarray(shapely.linestrings(np.stack([uv[start], uv[end]], axis=1)))
+    one, other = shapely.STRtree(segments).query(segments)  # whose boxes meet
+    apart = (one < other) & (start[one] != end[other]) & (end[one] != start[other])
     ends = start[one], end[one], start[other], end[other]
     a, b, c, d = (uv[rows[apart]] for rows in ends)
     return not ((_side(a, b, c) != _side(a, b, d)) & (_side(c, d, a) != _side(c, d, b))).any()

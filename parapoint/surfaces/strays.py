@@ -92,7 +92,10 @@ def fitted_rows(given: npt.ArrayLike | Surface) -> tuple[Surface, dict[str, obje
     ordered = points[np.lexsort(points.T)]
     repeated = int((ordered[1:] == ordered[:-1]).all(axis=1).sum())
     if repeated:
-        logger.warning("%d of %d points repeat others and count once", repeated, len(points))
+        which = "the first " if len(points) < len(surface.points) else ""
+        logger.warning(
+            "%d of %s%d points repeat others and count once", repeated, which, len(points)
+        )
     return surface, {
         "dropped_not_finite": surface.dropped,
         "dropped_duplicates": repeated,

@@ -55,7 +55,8 @@ def thinned(
         if kind in SHOWN:
             values = piece.attributes[SHOWN[kind]]
             kinds.add(values.dtype)
-            has_shown |= bool(values[known].any())
+            alike = values[known, :3] if kind == "colour" else values[known]  # alpha shows nothing
+            has_shown |= bool(alike.any())
         numbers, first = np.unique(cubes.of(piece.points[known]), return_index=True)
         fresh = np.append(taken, -1)[np.searchsorted(taken, numbers)] != numbers
         if fresh.any():

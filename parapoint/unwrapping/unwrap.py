@@ -100,7 +100,7 @@ class Unwrap:
     distortion: str = "isometric"
 
     requires: ClassVar[frozenset[str]] = frozenset({"faces", "manifold", "oriented", "connected"})
-    packages: ClassVar[tuple[str, ...]] = ("libigl", "shapely")
+    packages: ClassVar[tuple[str, ...]] = ("libigl", "scipy", "shapely")
 
     def __post_init__(self) -> None:
         if self.price is not None:
@@ -171,7 +171,8 @@ class Unwrap:
     @property
     def _grows(self) -> bool:
         """Whether the seam is led on to where the map is most distorted."""
-        return self.price is not None and self.distortion != "conformal"
+        is_asked = self.price is not None or self.max_distortion is not None
+        return is_asked and self.distortion != "conformal"
 
     @property
     def _need(self) -> Need:
@@ -313,7 +314,7 @@ def _seam(
     begun = clock.worked()
     try:
         uv, facts = computed(begun + SHARE_OF_SEAM * (deadline - begun))
-    except ReconstructionError as error:
+    except (InputError, ReconstructionError) as error:  # such as points along a curve
         return _least_cut(mesh), {"failed": str(error)}
     return learned_seam(mesh, uv), facts
 
@@ -328,6 +329,7 @@ def _map_of_points(mesh: Mesh, seed: int, deadline: float) -> tuple[FloatArray, 
 
     Raises:
         ReconstructionError: the points show no surface that can be followed.
+        InputError: they lie along a curve, or there are too few.
     """
     points = min(ENOUGH_POINTS, max(FEWEST_VERTICES, POINTS_OF_A_FACE * len(mesh.faces)))
     budget = None

@@ -4,7 +4,9 @@ import os
 import numpy as np
 import pytest
 
-from parapoint import ComputedMap, InputError, Mesh, ParaPoint, cli
+from parapoint import ComputedMap, InputError, Mesh, ParaPoint, PointCloud, cli
+from parapoint.commands.fitting import fitted
+from parapoint.computed.reconstruction import ReconstructionError
 from parapoint.files import reading as files
 from parapoint.surfaces.across_seams import MOST_PIECES, edges_across_seam, opened
 from parapoint.testing import irregular_disk
@@ -280,11 +282,33 @@ def test_where_no_map_can_be_computed_one_is_trained_and_a_line_says_so(
     assert "no map could be computed, so one is trained" in caplog.text
 
 
+def test_the_training_that_stands_in_takes_what_was_asked_of_the_map(monkeypatch) -> None:
+    fitted_ones = []
+
+    def fit(self, *_, **__):
+        fitted_ones.append(self.get_params())
+        if isinstance(self, ComputedMap):
+            raise ReconstructionError("no surface")
+        return self
+
+    monkeypatch.setattr("parapoint.estimator.Estimator.fit", fit)
+    cloud = PointCloud(np.eye(3))
+    for model in (ComputedMap(), ComputedMap(700, "isometric", 9.0, "each", 5)):
+        fitted("a", cloud, model, lambda _: None)
+    names = ("preset", "points", "distortion", "time_budget", "components", "seed")
+    assert [[one[name] for name in names] for one in fitted_ones[1::2]] == [
+        ["learned", None, None, 300.0, "together", 0],
+        ["learned", 700, "isometric", 9.0, "each", 5],
+    ]
+
+
 def test_the_checkerboard_alternates() -> None:
-    board = checkerboard(4, 8)
-    assert board.shape == (32, 32, 3)
-    assert (board[0, 0] == board[8, 8]).all()
-    assert (board[0, 0] != board[0, 8]).all()
+    for size in (256, 100):
+        board = checkerboard(size)
+        assert board.shape == (size, size, 3)
+        for row, column in np.ndindex(32, 32):
+            at = board[(2 * row + 1) * size // 64, (2 * column + 1) * size // 64]
+            assert (at == board[0, 0]).all() == ((row + column) % 2 == 0)
 
 
 def test_a_diverged_fit_is_one_line(cloud, tmp_path, monkeypatch, capsys) -> None:

@@ -11,6 +11,7 @@ from parapoint.fitting import Fitted
 from parapoint.learned import presets
 from parapoint.learned.networks import Networks
 from parapoint.learned.presets import PRESETS
+from parapoint.surfaces.strays import fitted_rows
 from parapoint.testing import check_method
 
 TINY = {"preset": "paper", "points": 150, "subset": 100, "iterations": 6, "device": "cpu"}
@@ -230,6 +231,13 @@ def test_rows_that_were_left_out_are_counted_over_all_components(caplog) -> None
         assert model.report_["dropped_not_finite"] == 7
         assert model.report_["dropped_duplicates"] == 60
     assert "60 of 860 points repeat others and count once" in caplog.text
+
+
+def test_repeated_rows_are_counted_among_so_many(caplog, monkeypatch) -> None:
+    monkeypatch.setattr("parapoint.surfaces.strays.MOST_COMPARED", 300)
+    points = paraboloid()[:200]
+    fitted_rows(PointCloud(np.concatenate([points, points])))
+    assert caplog.messages == ["100 of the first 300 points repeat others and count once"]
 
 
 class KilledError(Exception):

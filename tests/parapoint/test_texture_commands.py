@@ -132,10 +132,10 @@ def test_every_phase_is_told(command, model, scan, capsys, monkeypatch) -> None:
     }
     computing = ["reconstructing", "cutting", "flattening"]
     wanted = {
-        "unwrap": ["reading", *computing, "mapping", "baking", "writing"],
+        "unwrap": ["reading", *computing, "mapping", "baking", "writing", "measuring"],
         "bake": ["reading", "baking", "writing"],
         "fit": ["reading", *computing, "writing", "measuring"],
-        "map": ["reading", "mapping", "baking", "writing"],
+        "map": ["reading", "mapping", "baking", "writing", "measuring"],
         "mesh": ["reading", "cutting and flattening", "packing", "baking", "writing", "measuring"],
     }
     place = arguments[command][0]
@@ -389,4 +389,41 @@ def test_a_texture_that_the_format_cannot_hold_is_told(scan, tmp_path, capsys, c
     ],
 )
 def test_advice_is_none_that_was_followed(budget, distortion, says) -> None:
-    assert advice_of_cloud(budget, distortion)["starved"] == says
+    assert advice_of_cloud(budget, distortion, "together")["starved"] == says
+    for components in ("together", "largest", "each"):
+        overlap = advice_of_cloud(budget, distortion, components)["overlap"]
+        assert ("--components each" in overlap) == (components != "each")
+
+
+@pytest.mark.parametrize(("ending", "is_y_up"), [(".obj", True), (".ply", False)])
+def test_a_picture_of_a_cloud_is_upright(ending, is_y_up, scan, capsys, monkeypatch) -> None:
+    tmp_path, source = scan.parent, scan.with_suffix(ending)
+    if ending != ".ply":
+        cloud = read_surface(scan)
+        write_points(source, cloud, cloud.points[:, :2])
+    seen = []
+    monkeypatch.setattr(
+        "parapoint.commands.output.write_preview",
+        lambda *_, is_y_up: seen.append(is_y_up),
+    )
+    arguments = ["unwrap", source, "--out", tmp_path / "a.npz", "--preview", tmp_path / "a.png"]
+    assert run(arguments, capsys)[0] == 0
+    assert seen == [is_y_up]
+
+
+def test_a_checkerboard_has_the_size_that_was_asked_for(model, bowl, tmp_path) -> None:
+    bare = PointCloud(bowl.points)
+    for size in (16, 100):
+        facts = write(model, bare, str(tmp_path / "a.obj"), texture=size)
+        assert facts["texture"] == size
+        with Image.open(tmp_path / "a.png") as picture:
+            assert picture.size == (size, size)
+
+
+def test_points_that_are_left_out_are_those_of_the_cloud(model, bowl, tmp_path, monkeypatch):
+    """The model's counts are of the points drawn, which may be few of a scan's."""
+    many = PointCloud(np.repeat(bowl.points, 5, axis=0))
+    monkeypatch.setattr(ComputedMap, "report_", {"points": COUNT, "missed": COUNT // 10})
+    facts = write(model, many, str(tmp_path / "a.glb"), texture=16)
+    assert facts["unmapped_points"] == COUNT // 2
+    assert facts["mapped_points"] == 5 * COUNT - COUNT // 2

@@ -162,6 +162,10 @@ def test_what_no_point_has_cannot_be_baked(kind, message) -> None:
 def test_what_is_0_at_all_points_was_never_taken(kind: str, name: str, message: str) -> None:
     """Scanners leave room for it; one point that has some is enough."""
     zeros = np.zeros((4, 3), np.uint8) if kind == "colour" else np.zeros(4, np.uint16)
+    if kind == "colour":  # that they are opaque shows nothing
+        opaque = np.column_stack([zeros, np.full(4, 255, np.uint8)])
+        with pytest.raises(InputError, match=message):
+            thinned([PointCloud(CORNERS, attributes={name: opaque})], kind, SQUARE, 8)
     none = PointCloud(CORNERS, attributes={name: zeros})
     with pytest.raises(InputError, match=message):
         thinned([none, none], kind, SQUARE, 8)

@@ -11,6 +11,7 @@ from benchmarks.cases import builtin
 from benchmarks.metrics.evaluation import evaluate
 from parapoint import clock
 from parapoint.computed.reconstruction import ReconstructionError
+from parapoint.errors import InputError
 from parapoint.planar import coarse, descent
 from parapoint.planar.descent import sound
 from parapoint.planar.domains import FlatteningError
@@ -98,6 +99,9 @@ def test_under_a_bound_the_shortest_of_three_seams_stays(monkeypatch, runs) -> N
     assert len(runs) == 3
     met = [run for run in runs if run.energy <= 4.6]
     assert made.report["end_energy"] == min(met, key=lambda run: run.rim).energy
+    runs.clear()
+    without = Unwrap(price=None, max_distortion=4.6).parameterize(CAP, seed=0)
+    assert without.report == made.report
 
 
 def test_slender_faces_are_opened_along_a_map_of_points(monkeypatch) -> None:
@@ -166,15 +170,23 @@ def test_a_start_begins_where_as_much_time_is_left_as_another_took(
     assert len(runs) == starts
 
 
-def test_where_no_map_tells_a_seam_the_automatic_cut_opens_the_mesh(monkeypatch):
+@pytest.mark.parametrize("error", [ReconstructionError, InputError])
+def test_where_no_map_tells_a_seam_the_automatic_cut_opens_the_mesh(error, monkeypatch):
     def fails(*_):
-        raise ReconstructionError("no flat map")
+        raise error("no flat map")
 
     monkeypatch.setattr(unwrap, "map_of_faces", fails)
     result = Unwrap(price=None).parameterize(sphere(), seed=0)
     assert result.report["computed"] == {"failed": "no flat map"}
     automatic = cut_to_disk(sphere())
     assert len(result.uv) == len(automatic.vertices)
+
+
+@pytest.mark.parametrize("stretch", [1e-2, 1e4])
+def test_a_surface_whose_points_lie_along_a_curve_or_a_plane_is_mapped(stretch) -> None:
+    mesh = Mesh(sphere().vertices * [1, 1, stretch], sphere().faces)
+    made = Unwrap().parameterize(mesh, seed=0)
+    assert made.report["bijective"]
 
 
 def test_a_large_mesh_is_brought_down_from_the_better_start_alone(runs, settled) -> None:

@@ -265,6 +265,40 @@ def test_other_formats(box, tmp_path, capsys, caplog) -> None:
     assert len(read_surface(tmp_path / "out.glb").faces) == 12
 
 
+@pytest.mark.parametrize("ending", [".npz", ".ply", ".obj", ".glb"])
+def test_colours_that_no_texture_shows_are_said_to_be_left_out(
+    ending, tmp_path, capsys, caplog
+) -> None:
+    """Two components, of which the largest is written in the last two runs."""
+    path = tmp_path / "coloured.off"
+    corners = "0 0 0 255 0 0\n1 0 0 0 255 0\n0 1 0 0 0 255\n"
+    more = "9 0 0 1 2 3\n9.1 0 0 1 2 3\n9 0.1 0 1 2 3\n"
+    path.write_text(f"COFF\n6 2 0\n{more}{corners}3 0 1 2\n3 3 4 5\n")
+    out = tmp_path / f"out{ending}"
+    assert run(["unwrap", path, "--out", out, "--components", "largest"], capsys)[0] == 0
+    shown = ending in {".obj", ".glb"}
+    assert ("left out: colours" in caplog.text) == (not shown)
+    if ending == ".obj":
+        picture = np.asarray(Image.open(tmp_path / "out.png"), dtype=int)
+        mesh, held = read_parameterized(out)
+        assert len(mesh.faces) == 1
+        middle = held.uv[held.corners[0]].mean(axis=0)
+        row, column = ((1 - middle[1]) * len(picture), middle[0] * len(picture))
+        assert np.abs(picture[int(row), int(column)] - 85).max() <= 2
+
+
+def test_the_margin_is_in_texels_of_the_texture_that_is_written(
+    box, tmp_path, capsys, monkeypatch
+) -> None:
+    """An old picture that is larger than TEXTURE sets the size."""
+    monkeypatch.setattr("parapoint.commands.mesh_output.TEXTURE", 64)
+    monkeypatch.setattr("parapoint.commands.unwrap.TEXTURE", 64)
+    (tmp_path / "colours.mtl").write_text("newmtl red\nmap_Kd large.png\n")
+    Image.new("RGB", (256, 256), (9, 9, 9)).save(tmp_path / "large.png")
+    unfold(box, tmp_path / "out.glb", capsys, "--margin", 8)
+    assert read_parameterized(tmp_path / "out.glb")[1].uv.min() == pytest.approx(8 / 256, abs=1e-3)
+
+
 @pytest.mark.parametrize(
     ("seams", "more", "message"),
     [
