@@ -129,7 +129,7 @@ def flattened(mesh: Mesh, faces: IntArray) -> tuple[FloatArray, FloatArray]:
     used, corners = np.unique(mesh.faces[faces], return_inverse=True)
     disk = domain(Mesh(mesh.vertices[used], corners.reshape(-1, 3)))
     rows = rigid(disk)
-    s1, s2 = singular_values(frames(disk), rows, disk.faces)
+    s1, s2 = singular_values(frames(disk.vertices, disk.faces), rows, disk.faces)
     uv = np.zeros((len(mesh.vertices), 2))
     uv[used] = rows
     return uv, (s1 - 1) ** 2 + (s2 - 1) ** 2

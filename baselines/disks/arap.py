@@ -56,7 +56,7 @@ class ARAP:
         began = perf_counter()
         disk = domain(surface)
         check_triangles(disk.vertices, disk.faces)
-        frame = frames(disk)
+        frame = frames(disk.vertices, disk.faces)
         weight = 1 / (2 * np.abs(np.linalg.det(frame)) * disk.area)
         uv = tutte(disk)
         held = disk.loop[:1]

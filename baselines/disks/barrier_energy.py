@@ -102,7 +102,7 @@ class Energy:
 
     def __init__(self, disk: Domain, reach: float) -> None:
         self.faces = disk.faces
-        frame = frames(disk)
+        frame = frames(disk.vertices, disk.faces)
         weight = 1 / np.abs(np.linalg.det(frame))
         self.weight = weight / weight.sum()
         self.boundary = Boundary(disk, reach)

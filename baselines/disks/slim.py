@@ -93,7 +93,7 @@ class SLIM:
         Raises:
             FlatteningError: the energy did not fall.
         """
-        frame = frames(disk)
+        frame = frames(disk.vertices, disk.faces)
         weight = 1 / (2 * np.abs(np.linalg.det(frame)) * disk.area)
 
         def energy(uv: FloatArray) -> float:

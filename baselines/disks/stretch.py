@@ -18,7 +18,7 @@ MOST_STEPS = 30
 
 def stretches(disk: Domain, uv: FloatArray) -> FloatArray:
     """(F,) squared stretch (1/s1² + 1/s2²) / 2 of each triangle, in a plane of the same area."""
-    s1, s2 = singular_values(frames(disk), scaled(disk, uv), disk.faces)
+    s1, s2 = singular_values(frames(disk.vertices, disk.faces), scaled(disk, uv), disk.faces)
     return np.asarray((s1**-2 + s2**-2) / 2)
 
 

@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from typing import Literal
 
-from benchmarks.metrics.usability import LEAST_PART
+from parapoint.surfaces.areas import LEAST_PART, MOST_STARVED
 
 Grade = Literal["broken", "collapsed", "flawed", "usable"]
 GRADES: tuple[Grade, ...] = ("broken", "collapsed", "flawed", "usable")
@@ -24,9 +24,6 @@ FLIPPED = 0.005
 OVERLAPPED = 0.01
 """Fraction of the surface that a usable map of a cloud may overlap. For a cloud without faces, the
 fraction of the points that may collide."""
-STARVED_SHARE = 0.02
-"""Fraction of the surface that may be starved in a usable map: that may get less than a quarter of
-its fair area (see `benchmarks.metrics.usability`)."""
 
 FROM_POINTS = frozenset(
     {
@@ -40,7 +37,7 @@ BOUNDS = (
     f"broken: more than {BROKEN:.0%} of the surface flipped or overlapped, or not finite; "
     f"collapsed: a part of at least {LEAST_PART:.0%} of the surface has less than a quarter of its "
     f"fair area; usable: no flips and overlaps (of a cloud at most {FLIPPED:.1%} and "
-    f"{OVERLAPPED:.0%}), nothing collapsed, at most {STARVED_SHARE:.0%} starved; flawed: the rest"
+    f"{OVERLAPPED:.0%}), nothing collapsed, at most {MOST_STARVED:.0%} starved; flawed: the rest"
 )
 """What the grades mean, in one line for the notes of a table."""
 
@@ -79,7 +76,7 @@ def grade(values: Mapping[str, float], *, of_cloud: bool) -> Grade:
         if of_cloud
         else faces == 0 and overlapped == 0 and degenerate == 0
     )
-    return "usable" if is_sound and starved <= STARVED_SHARE else "flawed"
+    return "usable" if is_sound and starved <= MOST_STARVED else "flawed"
 
 
 def grade_of(method: str, values: Mapping[str, object]) -> Grade | None:
@@ -107,5 +104,5 @@ def _grade_of_points(values: Mapping[str, float]) -> Grade:
         return "broken"
     if values["point_part_area_ratio_min"] < 1:
         return "collapsed"
-    is_sound = collided <= OVERLAPPED and values["starved_point_fraction"] <= STARVED_SHARE
+    is_sound = collided <= OVERLAPPED and values["starved_point_fraction"] <= MOST_STARVED
     return "usable" if is_sound else "flawed"

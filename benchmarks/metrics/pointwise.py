@@ -16,8 +16,8 @@ from scipy.spatial import cKDTree
 
 from benchmarks.metrics.distortion import mean, power_above
 from benchmarks.metrics.seams import QUARTILE, SPANNING_LENGTH, SPANNING_STRETCH, square_side
-from benchmarks.metrics.usability import LEAST_PART, STARVED
 from parapoint.errors import InputError
+from parapoint.surfaces.areas import LEAST_PART, STARVED
 from parapoint.surfaces.parameterization import PointParameterization
 from parapoint.surfaces.places import places
 from parapoint.surfaces.scan_lines import breadth

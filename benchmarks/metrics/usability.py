@@ -13,13 +13,10 @@ from functools import cached_property
 import numpy as np
 
 from benchmarks.metrics.distortion import FaceDistortion, Triangles, percentile
+from parapoint.surfaces.areas import LEAST_PART, STARVED
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, edge_components
 
-STARVED = 0.25
-"""Ratio r below which a place on the surface is starved of area."""
-LEAST_PART = 0.01
-"""Share of the surface, from 0 to 1, from which on a starved part counts as collapsed."""
 WINDOW = 2
 """Vertices on either side of one that are averaged with it where a seam is smoothed."""
 

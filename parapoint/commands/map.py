@@ -23,7 +23,7 @@ logger = logging.getLogger("parapoint")
 @click.argument("model", type=click.Path(), metavar="DIR")
 @click.argument("surface", type=click.Path(), metavar="INPUT")
 @click.option(
-    "--out", type=click.Path(), required=True, metavar="FILE", help="FILE.obj, .ply or .npz."
+    "--out", type=click.Path(), required=True, metavar="FILE", help="FILE.obj, .glb, .ply or .npz."
 )
 @click.option("--device", default="auto", show_default=True, help="auto, cpu or cuda.")
 @click.option("--force", is_flag=True, help="Replace files of yours that are in the way.")
@@ -34,7 +34,8 @@ def map_(model: str, surface: str, out: str, device: str, *, force: bool, as_jso
 
     DIR is a folder of `fit`, INPUT a cloud or a mesh of the same surface. The fitted points fill
     the unit square. A mesh written as OBJ is cut along the seams of the map: a face that lies
-    across one keeps its shape and stays on one side.
+    across one keeps its shape and stays on one side. Of a cloud a GLB file holds the model's mesh,
+    with the cloud's colours as its texture.
     """
     out = target(out, [surface], force=force, textured=False)
     from parapoint.estimator import load

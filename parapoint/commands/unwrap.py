@@ -48,19 +48,28 @@ logger = logging.getLogger("parapoint")
     "--components",
     default="together",
     show_default=True,
-    help="One map of all, or of each or the largest component.",
+    help="Of a cloud one map of all, of each or of the largest component.",
 )
 @click.option(
     "--distortion",
     metavar="D",
     help="conformal, balanced (default of a cloud) or isometric (of a mesh).",
 )
-@click.option("--seam-price", type=float, metavar="P", help="Energy a branch must gain a length.")
+@click.option(
+    "--seam-price",
+    type=float,
+    metavar="P",
+    help="Fall of the energy that a length of seam must bring.",
+)
 @click.option("--max-distortion", type=float, metavar="E", help="Cut on until the energy is E.")
-@click.option("--seams", metavar="FILE", help="Cut along its edges, or the seams of its map.")
+@click.option(
+    "--seams", metavar="FILE", help="Cut along the edges it lists, or the seams of its map."
+)
 @click.option("--per-vertex", is_flag=True, help="One uv for each vertex, whatever the seams.")
 @click.option("--texture", type=int, metavar="N", help="Texels along a side of a texture.")
-@click.option("--margin", type=int, metavar="TEXELS", help="Free texels around the map.")
+@click.option(
+    "--margin", type=int, metavar="TEXELS", help="Free texels around the map and its charts."
+)
 @click.option("--preview", metavar="FILE", help="FILE.png: the surface beside its layout.")
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--force", is_flag=True, help="Replace files of yours that are in the way.")

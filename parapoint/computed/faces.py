@@ -22,8 +22,9 @@ LEAST_VERTICES = 3_000
 MOST_SPLITS = 2
 """How often a face is split in four at most: what has few faces has a simple shape."""
 LONGEST = 10.0
-"""A mesh is uneven with an edge longer than this many of those of as many equal triangles, as the
-slender faces of CAD parts have: 16 on two of them, at most 8 on 45 scanned or modelled surfaces."""
+"""A mesh is uneven if its longest edge is longer than this many sides of an equilateral triangle of
+its mean area, as slender faces of CAD parts make it: 16 on two of them, at most 8 on 45 scanned or
+modelled surfaces."""
 
 
 def is_even(mesh: Mesh) -> bool:

@@ -35,7 +35,8 @@ FEWER_DEFECTS = 0.5
 with noise of 0.5 and 1 % of the diagonal, 0.6 to 3 on models with details as fine as the
 spacing."""
 LONELY = 6.0
-"""Cost of a vertex most of whose edges cross the seam, in such edges' share."""
+"""What a vertex pays, beside the share of its edges that cross the seam: so many times what this
+share exceeds a half by."""
 SWEEPS = 10
 """Passes over the seam in the choice of sides."""
 SEAM_SHARE = 0.5

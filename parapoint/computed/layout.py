@@ -9,14 +9,12 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from parapoint.computed.scale import laplacian
+from parapoint.computed.scale import COTANGENTS, laplacian
 from parapoint.planar.embedding import factored
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, twin_halfedges
 
 LARGEST_SCALE = 8.0
 """Largest absolute log scale: what is smaller or larger is as good as lost."""
-COTANGENTS = (0.02, 20.0)
-"""Range of twice the weight of a face at an edge, so that all are positive."""
 
 
 def scaled_layout(mesh: Mesh, scale: FloatArray) -> FloatArray:

@@ -66,7 +66,7 @@ THINNEST = 1e-7
 """Least height of a triangle over its longest edge."""
 QUARTER = math.pi / 2
 SHARP = math.pi / 3
-"""A turn from one sheet that crosses another to that one is at least so sharp, in radians."""
+"""Least bend, in radians, that counts as a turn from one sheet to another that crosses it."""
 SMOOTHER = 0.97
 """Most of its roughness that the front along sheets leaves where it is taken; without sheets that
 cross it leaves 0.98 or more. It is not tried where turns from sheet to sheet are fewer."""

@@ -33,11 +33,11 @@ and the rise at which their weight falls to 1/e."""
 SHEET_NEIGHBOURS, SHEET_AGREEMENT = 18, 0.8
 """Points on the sheet that may be in the ball of a triangle, and the least cosine there."""
 CORNERS = 12
-"""The nearest of these are tried as corners."""
+"""So many of the nearest points of a point's sheet are tried as corners of its triangles."""
 NEAREST = 64
 """Points among which those on the sheet are sought: the other sheet may be much denser."""
 LOOSEST = 1.5
-"""Largest circumradius of a triangle, in distances to the nearest six points on the sheet."""
+"""Largest circumradius of a triangle, in mean distances to the nearest six points on the sheet."""
 
 
 def sheet_normals(

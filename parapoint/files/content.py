@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from parapoint.errors import InputError
+from parapoint.surfaces.places import places
 from parapoint.surfaces.surface import FloatArray, IntArray
 
 NO_UV = np.iinfo(np.int64).min
@@ -134,15 +135,10 @@ def strip_triangles(sizes: IntArray, corners: IntArray) -> IntArray:
 def welded(points: FloatArray) -> tuple[FloatArray, IntArray]:
     """The distinct points in the order in which they first appear, and the row of each point.
 
-    Points are one only where their coordinates are exactly equal; there is no tolerance that
-    would be right for every file.
+    Points are one only where their coordinates are exactly equal: a reader changes nothing
+    (`Mesh.welded` has a tolerance).
     """
-    order = np.lexsort(points.T)
-    ordered = points[order]
-    fresh = np.ones(len(points), dtype=bool)
-    fresh[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    group = np.empty(len(points), dtype=np.int64)
-    group[order] = np.cumsum(fresh) - 1
-    first = order[fresh]  # lexsort is stable: the first of its group in the file
+    place = places(points)
+    first = np.unique(place, return_index=True)[1]
     rank = np.argsort(np.argsort(first))
-    return points[np.sort(first)], rank[group]
+    return points[np.sort(first)], rank[place]

@@ -61,6 +61,7 @@ FORMATS: dict[str, Callable[[bytes, Path], Content]] = {
 """Reader of each file name ending; it gets the bytes and the folder of the file."""
 
 UV_FORMATS = (".obj", ".ply", ".glb", ".gltf", ".npz")
+"""Endings of files that can carry a UV map of a mesh."""
 
 UNREADABLE = (
     *(ValueError, TypeError, LookupError, AttributeError, ArithmeticError, EOFError, RuntimeError),
@@ -158,7 +159,7 @@ def read_polygons(path: str | Path) -> Polygons | PointCloud:
 
 
 def read_parameterized(path: str | Path) -> tuple[Mesh, Parameterization]:
-    """The mesh in an OBJ (with vt) or glTF file, and the UV map that it carries.
+    """The mesh in an OBJ (with vt), PLY, glTF or NPZ file, and the UV map that it carries.
 
     Rows of `uv` are the file's, but for two habits of exporters, so that a seam is a place where
     the map is cut. Where several rows hold the same UV for the same vertex, all corners use the
@@ -172,7 +173,9 @@ def read_parameterized(path: str | Path) -> tuple[Mesh, Parameterization]:
     path = Path(path)
     with faults_of(path):
         if path.suffix.lower() in FORMATS and path.suffix.lower() not in UV_FORMATS:
-            raise InputError("this format carries no UV map; give an OBJ with vt lines, or GLB")
+            raise InputError(
+                "this format carries no UV map; give an OBJ with vt lines, a PLY, GLB or NPZ file"
+            )
         content = _content(path)
         if len(content.sizes) == 0:
             raise InputError("has no faces; a UV map needs a mesh")

@@ -1,7 +1,8 @@
 """Where the seam of a large mesh should grow, told by a simplified one.
 
-To where a map is distorted is a matter of the whole shape, which few faces show. Only the ends of
-the branches are taken over: on the large mesh they are joined to the seam along its own edges.
+Where a map is distorted depends on the whole shape, and a few faces suffice to show that. Only the
+ends of the branches are taken over: on the large mesh they are joined to the seam along its own
+edges.
 """
 
 from __future__ import annotations

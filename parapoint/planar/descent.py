@@ -19,7 +19,7 @@ from parapoint.planar.scaffold import (
     steps_down,
 )
 from parapoint.surfaces.cutting import cut_along, edge_lengths, origin, path_edges
-from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
+from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, compact
 
 ENERGY = igl.SYMMETRIC_DIRICHLET
 LEAST_ENERGY = 4.0
@@ -34,7 +34,7 @@ least. Where a surface unrolls without distortion, each step takes away a tenth 
 however little that is; and a noisy scan of 160,000 faces comes from 4.196 to 4.190 in twelve more
 steps."""
 REACH = 10
-"""An energy is in sight of a descent that would come there in so many steps like its last one."""
+"""A goal is in sight if the descent would reach it in at most this many steps like its last one."""
 
 
 class Run:
@@ -185,5 +185,4 @@ def sound(mesh: Mesh) -> Mesh:
         InputError: a triangle has no area.
     """
     check_triangles(mesh.vertices, mesh.faces)
-    used, faces = np.unique(mesh.faces, return_inverse=True)
-    return Mesh(mesh.vertices[used], faces.reshape(-1, 3))
+    return compact(mesh.vertices, mesh.faces)

@@ -142,11 +142,9 @@ def scaled(disk: Domain, uv: FloatArray) -> FloatArray:
     return np.asarray(uv * np.sqrt(disk.area / area), dtype=np.float64)
 
 
-def frames(disk: Domain) -> FloatArray:
+def frames(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """(F, 2, 2) for each triangle, the inverse of its two edges from corner 0 in its own plane."""
-    first, second = (
-        disk.vertices[disk.faces[:, k]] - disk.vertices[disk.faces[:, 0]] for k in (1, 2)
-    )
+    first, second = (vertices[faces[:, k]] - vertices[faces[:, 0]] for k in (1, 2))
     length = np.linalg.norm(first, axis=1)
     along = (first * second).sum(axis=1) / length
     height = np.linalg.norm(np.cross(first, second), axis=1) / length

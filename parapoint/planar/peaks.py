@@ -28,7 +28,7 @@ def peaks(
         graph: (V, V) its edges.
         distance: (V,) each vertex's from the seam.
         excess: (F,) what each face holds; it counts for the farthest of its corners.
-        least: what a part must hold more than for a branch of a length.
+        least: gives, for the length of a branch, what a part must hold more than.
     """
     rows = np.arange(len(mesh.faces))
     farthest = mesh.faces[rows, distance[mesh.faces].argmax(axis=1)]

@@ -24,16 +24,12 @@ from parapoint.surfaces.cutting import (
     ways_to,
 )
 from parapoint.surfaces.parameterization import Parameterization
+from parapoint.surfaces.seam_points import STRETCH, THRESHOLD
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
 
 Transform = Callable[[FloatArray], FloatArray]
 """A map of points (N, 3) to the plane (N, 2)."""
 
-LENGTH = 0.01
-"""Length in the plane above which an edge may lie across the seam, in sides of the map's square
-bounding box: T_cut of the paper."""
-STRETCH = 5.0
-"""An edge across the seam is stretched more than this many times as much as the edges around it."""
 MOST_PIECES = 2_000_000
 """The edges together are divided into at most this many pieces, besides one for each edge."""
 IN_BAND = 0.1
@@ -80,7 +76,7 @@ def edges_across_seam(
     quartile[used] = np.tile(stretch, 2)[order][(first + degree // 4)[used]]
     box = np.ptp(uv[mesh.referenced], axis=0).max()
     calm = np.minimum(quartile[start], quartile[end])[edge]
-    across = (length > LENGTH * box) & (stretch > STRETCH * calm)
+    across = (length > THRESHOLD * box) & (stretch > STRETCH * calm)
     return np.asarray(np.bincount(edge, across, len(count)) > 0)
 
 

@@ -10,7 +10,7 @@ from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
 from parapoint.surfaces.scan_lines import breadth
-from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh, Surface
+from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh, Surface, compact
 
 COMPONENTS = ("together", "each", "largest")
 """What the parameter `components` of a fit may say: one map of the whole surface, one of each
@@ -59,7 +59,7 @@ def components(surface: Surface) -> list[Surface]:
         label = surface.welded.face_components
         area = np.bincount(label, weights=surface.face_areas)
         order = [k for k in np.argsort(-area, kind="stable") if area[k] > 0]
-        return [_submesh(surface, label == k) for k in order] or [surface]
+        return [compact(surface.vertices, surface.faces[label == k]) for k in order] or [surface]
     label = cloud_labels(surface.points)
     by_size = np.argsort(-np.bincount(label), kind="stable")
     return [surface.chosen(label == k) for k in by_size]
@@ -69,7 +69,7 @@ def largest_component(mesh: Mesh) -> tuple[Mesh, BoolArray]:
     """The component of the largest area, and (F,) which faces are its."""
     label = mesh.welded.face_components
     chosen = label == np.bincount(label, weights=mesh.face_areas).argmax()
-    return _submesh(mesh, chosen), chosen
+    return compact(mesh.vertices, mesh.faces[chosen]), chosen
 
 
 def cloud_labels(points: FloatArray) -> IntArray:
@@ -91,9 +91,3 @@ def cloud_labels(points: FloatArray) -> IntArray:
         return np.zeros(len(points), dtype=np.int64)
     nearest = cKDTree(sample[large]).query(points)[1]
     return np.unique(label[large][nearest], return_inverse=True)[1].astype(np.int64)
-
-
-def _submesh(mesh: Mesh, chosen: np.ndarray) -> Mesh:
-    """These faces (F,) and their vertices."""
-    used, faces = np.unique(mesh.faces[chosen], return_inverse=True)
-    return Mesh(mesh.vertices[used], faces.reshape(-1, 3))

@@ -3,7 +3,7 @@
 What a method `requires` decides: a method gets the surface as it is wherever that meets the words
 (`REQUIREMENTS`). Else these steps are taken, the same for every method, in this order:
 
-- *weld*: vertices at exactly the same place become one; nothing that is apart is joined.
+- *weld*: vertices at one place, up to rounding (`Mesh.place`), become one.
 - *area*: the long edge of a face without area is flipped where another face is across it, so that
   no slit is left; other faces without area are dropped, and so are copies of a face.
 - *split* (`manifold`): the surface is opened along edges of more than two faces, and at vertices
@@ -41,6 +41,7 @@ from parapoint.surfaces.surface import (
     Mesh,
     PointCloud,
     Surface,
+    compact,
     flat_faces,
     turned_faces,
 )
@@ -216,7 +217,7 @@ def _repaired(mesh: Mesh, words: frozenset[str]) -> tuple[list[Mesh], list[str],
     component = made.face_components if "connected" in words else np.zeros(len(place), np.int64)
     order = np.argsort(component, kind="stable")
     bounds = np.cumsum(np.bincount(component))[:-1]
-    parts = [_compact(made.vertices, faces) for faces in np.split(made.faces[order], bounds)]
+    parts = [compact(made.vertices, faces) for faces in np.split(made.faces[order], bounds)]
     note(len(parts) if len(parts) > 1 else 0, "packed", "component")
     return parts, steps, _origin(whole.faces, place[order])
 
@@ -259,12 +260,6 @@ def _with_flipped_edges(mesh: Mesh) -> tuple[IntArray, int]:
             return made.faces.copy(), flips
         flips += int(changed.sum()) // 2
     return faces, flips
-
-
-def _compact(vertices: FloatArray, faces: IntArray) -> Mesh:
-    """The mesh of these faces, with their vertices alone."""
-    used, rows = np.unique(faces, return_inverse=True)
-    return Mesh(vertices[used], rows.reshape(-1, 3))
 
 
 def _origin(faces: IntArray, made: IntArray) -> IntArray:

@@ -36,7 +36,8 @@ ALONG = 0.4
 AROUND = 24
 """Neighbours that together say how far the next line is."""
 STILL = 0.98
-"""Lines are thinned again, as the next line is seen better each time, until so many points stay."""
+"""Lines are thinned again, as the next line is seen better each time, until at least this share of
+the points stays."""
 OFF = 0.7
 """Largest cosine with the direction of a line at which a neighbour is on another one."""
 BATCH = 4_096
@@ -88,9 +89,6 @@ def thinned(points: FloatArray) -> Lines | None:
 
     What is taken from a line are points much nearer to the next ones on it than the next line is:
     they show no more of the surface, but for noise, whose tiny triangles stand across it.
-
-    Raises:
-        InputError: most points see no second line.
     """
     count = breadth(points)
     if count is None:

@@ -12,13 +12,13 @@ NEIGHBOURS = 3
 """K_cut of the paper: nearest points in space that are looked at from a point on a seam."""
 THRESHOLD = 0.01
 """T_cut of the paper: distance in the plane, as a share of the side of the map's square bounding
-box, beyond which one of these neighbours lies across a seam."""
+box, beyond which one of these neighbours, or the other end of an edge, may lie across a seam."""
 AROUND = 8
 """Nearest points that tell how much the map stretches near a point. A seam leaves at least about
 half of them on its side, so their lower quartile is free of it."""
 STRETCH = 5.0
-"""How many times more than the pairs around either of them two neighbours are stretched across a
-seam."""
+"""How many times more than the pairs around either of them, or the edges around it, two neighbours
+or an edge are stretched across a seam."""
 
 
 def seam_points(points: FloatArray, uv: FloatArray, rule: str = "stretch") -> BoolArray:

@@ -23,8 +23,7 @@ APART = 30.0
 that lie thirty times as far apart as their points still do."""
 NEAREST = 6
 """The distance to the neighbour of this rank, its median over the points, is the spacing."""
-FEW = 10
-FEW_SHARE = 0.005
+FEW, FEW_SHARE = 10, 0.005
 """A group of points is stray if it has no more points than the larger of this number and share."""
 CLUMP_SHARE = 0.05
 """A group of up to this share of the points is stray as well if it lies CLUMP_RADII away."""
@@ -165,7 +164,7 @@ def unmapped(surface: Surface, uv: FloatArray, known: FloatArray | None = None) 
 
 
 def are_near(known: FloatArray, points: FloatArray) -> BoolArray:
-    """(N,) whether points (N, 3) are as near to known ones (n, 3) as no single stray one is."""
+    """(N,) whether points (N, 3) are nearer to known ones (n, 3) than any single stray point is."""
     tree = cKDTree(known)
     looked_at = known[:: len(known) // SAMPLED + 1]
     spacing = np.median(tree.query(looked_at, min(NEAREST + 1, len(known)))[0][:, -1])

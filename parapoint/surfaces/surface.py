@@ -283,6 +283,12 @@ class Mesh:
         return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2, dtype=np.float64)
 
 
+def compact(vertices: FloatArray, faces: IntArray) -> Mesh:
+    """The mesh of these faces (F, 3), with their vertices alone, in the same order."""
+    used, rows = np.unique(faces, return_inverse=True)
+    return Mesh(vertices[used], rows.reshape(-1, 3))
+
+
 def vertex_normals(mesh: Mesh) -> FloatArray:
     """(V, 3) unit normals of the vertices, the means of the faces around by area; or 0."""
     normals = np.zeros(mesh.vertices.shape)

@@ -31,7 +31,7 @@ BATCH = 262_144
 APART = 0.05
 """Distance from a mesh, in diagonals of the mesh, beyond which a point does not lie on it."""
 COMPARED = 1000
-"""Points whose distance is looked at."""
+"""Points whose distance is looked at: of a larger cloud at least so many, and fewer than twice."""
 
 Pixels = npt.NDArray[np.uint8 | np.uint16]
 

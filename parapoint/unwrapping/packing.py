@@ -8,7 +8,7 @@ import numpy as np
 
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.preparation import shelves
-from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
+from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, compact
 
 
 def by_component(mesh: Mesh, mapped: Callable[[Mesh], Parameterization]) -> Parameterization:
@@ -24,8 +24,7 @@ def by_component(mesh: Mesh, mapped: Callable[[Mesh], Parameterization]) -> Para
     count = 0
     for component in range(mesh.component_count):
         of = np.flatnonzero(label == component)
-        used, faces = np.unique(mesh.faces[of], return_inverse=True)
-        part = mapped(Mesh(mesh.vertices[used], faces.reshape(-1, 3)))
+        part = mapped(compact(mesh.vertices, mesh.faces[of]))
         corners[of] = part.corners + count
         maps.append(part.uv)
         count += len(part.uv)

@@ -10,6 +10,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from parapoint.planar.crossing import crossing_vertices
+from parapoint.planar.domains import frames, singular_values
 from parapoint.surfaces.areas import LEAST_PART, STARVED
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.surface import (
@@ -34,12 +35,14 @@ class Quality:
     """Numbers of one map in the unit square.
 
     Attributes:
-        angle_mean: mean difference of a corner's angle in space and in the plane, in degrees.
+        angle_mean: mean over the surface of the difference of a corner's angle in space and in the
+            plane, in degrees.
         angle_worst: the largest, in degrees.
         stretch_mean: mean over the surface of the larger of s1 and 1 / s2, the singular values of
             a triangle's map at the mean scale; 1 where nothing is stretched or shrunk.
         stretch_worst: the largest.
-        smallest_part: least mean area ratio of a starved part of 1 % of the surface; 1 for none.
+        smallest_part: least mean area ratio (a part's share of the map over its share of the
+            surface) of a connected starved part of at least 1 % of the surface; 1 for none.
         starved: share of the surface with an area ratio below STARVED.
         flipped: faces that are turned over.
         overlap: whether faces lie on others: "none", "some", or "unknown" where faces are turned
@@ -90,7 +93,10 @@ def quality(placed: Charted, texture: int) -> Quality:
     ratio = (np.abs(signed) / np.abs(signed).sum()) / (area / area.sum())
     share = area / area.sum()
     angles = np.abs(_angles(plane) - _angles(space))
-    stretch = _stretch(space, plane, float(np.sqrt(area.sum() / np.abs(signed).sum())))
+    scale = float(np.sqrt(area.sum() / np.abs(signed).sum()))
+    frame = frames(mesh.vertices, mesh.faces[solid])
+    s1, s2 = singular_values(frame, scale * held.uv, corners)
+    stretch = np.maximum(s1, 1 / np.maximum(np.abs(s2), 1e-300))
     starved: BoolArray = np.zeros(len(mesh.faces), dtype=bool)
     starved[solid] = ratio < STARVED
     ends = mesh.vertices[held.seams(mesh)]
@@ -150,19 +156,6 @@ def _angles(triangles: FloatArray) -> FloatArray:
     back = np.roll(triangles, 1, axis=1) - triangles
     across = np.linalg.norm(np.cross(ahead, back), axis=2)
     return np.asarray(np.degrees(np.arctan2(across, (ahead * back).sum(axis=2))))
-
-
-def _stretch(space: FloatArray, plane: FloatArray, scale: float) -> FloatArray:
-    """(F,) the larger of s1 and 1 / s2 of each triangle, the plane scaled by `scale`."""
-    first, second = space[:, 1] - space[:, 0], space[:, 2] - space[:, 0]
-    length = np.linalg.norm(first, axis=1)
-    along = (first * second).sum(axis=1) / length
-    height = np.linalg.norm(np.cross(first, second), axis=1) / length
-    u = scale * (plane[:, 1] - plane[:, 0])[:, :2] / length[:, None]
-    v = (scale * (plane[:, 2] - plane[:, 0])[:, :2] - along[:, None] * u) / height[:, None]
-    (a, c), (b, d) = u.T, v.T
-    turn, shear = np.hypot(a + d, c - b) / 2, np.hypot(a - d, c + b) / 2
-    return np.asarray(np.maximum(turn + shear, 1 / np.maximum(np.abs(turn - shear), 1e-300)))
 
 
 def _smallest_part(

@@ -77,13 +77,13 @@ class Unwrap:
     (`parapoint.surfaces.across_seams`). The best map stays, by its energy and the price of its
     seam: which start leads to it cannot be told before. Where the map must come below a bound on
     the energy, it is begun along the map of points, too, and the shortest stays.
-    Of a large mesh a simplified one tells which start is the better, and where to the seam grows
+    Of a large mesh a simplified one tells which start is the better, and where the seam grows to
     (`parapoint.planar.coarse`), but under a bound, as the two differ in energy.
     Components are mapped one after another.
 
     Attributes:
-        time_budget: seconds of work (`parapoint.clock`) for each component, or None for no bound.
-            No step begins after that; the map is then as good as it has become.
+        time_budget: seconds of work (`parapoint.clock`), which components share by their faces, or
+            None for no bound. No step begins after that; the map is then as good as it has become.
         price: what the symmetric Dirichlet energy (4 at least) must fall by for each sqrt(area) of
             seam; None for the seam of the computed map, no shorter and no longer. Under a bound on
             the energy it is not asked.
@@ -278,7 +278,7 @@ class Unwrap:
         return Begun(begun.seam, begun.told, run, None)
 
     def _is_led(self, mesh: Mesh) -> bool:
-        """Whether a simplified mesh tells where to the seam grows."""
+        """Whether a simplified mesh tells where the seam grows to."""
         return self._grows and self.max_distortion is None and len(mesh.faces) > LARGE
 
     def _keep_angles(self, run: Run) -> None:

@@ -17,10 +17,11 @@ from parapoint.surfaces.surface import FloatArray, IntArray
 V, VT, VN = (b"v ", b"v\t"), (b"vt ", b"vt\t"), (b"vn ", b"vn\t")
 F = (b"f ", b"f\t")
 FO = (b"fo ", b"fo\t")
+"""Beginnings of the lines that are read."""
 NO_SURFACE = tuple(
     word + blank for word in (b"l", b"surf", b"curv", b"curv2") for blank in (b" ", b"\t")
 )
-"""Beginnings of the lines that are read."""
+"""Beginnings of lines of curves and free-form surfaces, which are not read."""
 CONTINUED = re.compile(
     rb"\\[ \t]*(?:#[^\r\n]*)?(?:\r\n|\r|\n|\Z)([ \t]*(?:v[tnp]?|fo?|l|p|usemtl|mtllib)[ \t])?"
     rb"|#[^\r\n]*"

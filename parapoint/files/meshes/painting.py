@@ -9,8 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from parapoint.files.attributes import srgb
+from parapoint.files.meshes.gltf import opened
+from parapoint.files.meshes.gltf_primitives import draws_triangles
 from parapoint.files.meshes.materials import libraries, material_names, materials_of
 from parapoint.files.meshes.pictures import Material, Picture, bare_name, named_file, read_picture
+from parapoint.files.meshes.ply import pictures_of
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray
 
 logger = logging.getLogger("parapoint")
@@ -77,8 +80,6 @@ def _obj(path: Path) -> tuple[tuple[Material, ...], IntArray]:
 
 
 def _ply(path: Path) -> tuple[tuple[Material, ...], IntArray]:
-    from parapoint.files.writing.ply_rewriting import pictures_of
-
     names, number_of = pictures_of(path)
     materials = []
     for name in names:
@@ -90,9 +91,6 @@ def _ply(path: Path) -> tuple[tuple[Material, ...], IntArray]:
 
 
 def _gltf(path: Path) -> tuple[tuple[Material, ...], IntArray]:
-    from parapoint.files.meshes.gltf import opened
-    from parapoint.files.meshes.gltf_primitives import draws_triangles
-
     tree = opened(path)
     pictures: dict[int, Picture] = {}
     materials = []

@@ -25,6 +25,7 @@ from parapoint.files.content import (
     strip_triangles,
     whole,
 )
+from parapoint.files.decoding import plain
 from parapoint.files.meshes.ply_body import (
     BLOCK,
     Body,
@@ -47,6 +48,8 @@ LISTS = {*INDICES, "texcoord"}
 """Lists that are read."""
 POLYGONS = {"face", "tristrips"}
 """Elements that hold polygons."""
+PICTURE = "TextureFile "
+"""How the comment begins that names a picture, as MeshLab writes it."""
 UV_COLUMNS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texcoord_u", "texcoord_v"))
 """Names under which the UV of vertices stand."""
 
@@ -119,6 +122,17 @@ def opened(data: bytes) -> tuple[list[str], list[Table]]:
         tables.append(Table(name, count, {item.name: Column(*one) for item, one in pairs}))
     body.check_end(at)
     return comments, tables
+
+
+def pictures_of(path: Path) -> tuple[list[str], IntArray]:
+    """The pictures that a PLY file names, and (N,) the number of the one on each polygon."""
+    data = plain(path.read_bytes())
+    comments, tables = opened(data)
+    names = [line.removeprefix(PICTURE).strip() for line in comments if line.startswith(PICTURE)]
+    first, *others = (table for table in tables if table.name in POLYGONS and table.count)
+    if not others and "texnumber" in first.columns:
+        return names, first.columns["texnumber"].values.astype(np.int64)
+    return names, np.zeros(len(ply(data).sizes), dtype=np.int64)
 
 
 def _columns(

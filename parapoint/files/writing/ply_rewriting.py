@@ -12,13 +12,13 @@ from parapoint.files.content import ranges
 from parapoint.files.decoding import plain
 from parapoint.files.meshes.ply import (
     INDICES,
+    PICTURE,
     POLYGONS,
     UV_COLUMNS,
     Column,
     Table,
     header_of,
     opened,
-    ply,
 )
 from parapoint.files.polygons import corner_rows
 from parapoint.files.targets import complete_file
@@ -26,23 +26,10 @@ from parapoint.files.writing.point_writers import PLY_NAMES
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import IntArray
 
-PICTURE = "TextureFile "
-"""How the comment begins that names a picture, as MeshLab writes it."""
 NAMES = PLY_NAMES | {"i8": "int64", "u8": "uint64", "f2": "half"}
 """PLY's name of each type, and the usual ones of types that it lacks."""
 FACE_UV = {"texcoord", "texnumber"}
 """Properties of faces that go with the old UVs."""
-
-
-def pictures_of(path: Path) -> tuple[list[str], IntArray]:
-    """The pictures that a PLY file names, and (N,) the number of the one on each polygon."""
-    data = plain(path.read_bytes())
-    comments, tables = opened(data)
-    names = [line.removeprefix(PICTURE).strip() for line in comments if line.startswith(PICTURE)]
-    first, *others = (table for table in tables if table.name in POLYGONS and table.count)
-    if not others and "texnumber" in first.columns:
-        return names, first.columns["texnumber"].values.astype(np.int64)
-    return names, np.zeros(len(ply(data).sizes), dtype=np.int64)
 
 
 def is_rewritable(path: Path) -> bool:

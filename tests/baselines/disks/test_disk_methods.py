@@ -53,7 +53,7 @@ def stretches(mesh, result):
     uv = result.uv[result.corners].reshape(-1, 2)
     corners = np.arange(len(uv)).reshape(-1, 3)
     uv = uv * np.sqrt(disk.area / np.abs(signed_areas(uv, corners)).sum())
-    return np.stack(singular_values(frames(disk), uv, corners), axis=1)
+    return np.stack(singular_values(frames(disk.vertices, disk.faces), uv, corners), axis=1)
 
 
 def rolled(mesh):
@@ -427,7 +427,7 @@ def test_slim_refuses_a_start_with_a_triangle_without_area(monkeypatch):
 
 def test_a_start_whose_energy_has_no_number_is_no_minimum():
     disk = domain(irregular_disk())
-    frame = frames(disk)
+    frame = frames(disk.vertices, disk.faces)
     weight = np.full(len(disk.faces), 1 / len(disk.faces))
     flipped = tutte(disk) * [1, -1]
     for name in DENSITIES:
@@ -436,7 +436,9 @@ def test_a_start_whose_energy_has_no_number_is_no_minimum():
         assert not is_minimum(name, weight, frame, tutte(disk) * [1, 1e-3], disk.faces)
     # Where nothing pulls, as on a triangle mapped to itself, the slope is 0 and it is one.
     one = domain(Mesh([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
-    assert is_minimum("conformal", np.ones(1), frames(one), one.vertices[:, :2], one.faces)
+    assert is_minimum(
+        "conformal", np.ones(1), frames(one.vertices, one.faces), one.vertices[:, :2], one.faces
+    )
 
 
 def test_lscm_lays_its_far_vertices_on_the_first_axis_from_the_origin():

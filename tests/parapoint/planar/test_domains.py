@@ -142,7 +142,9 @@ def test_singular_values_of_linear_maps(stretch, wanted):
     turned, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))
     flat = np.array([[0.0, 0], [2, 0.5], [0.3, 1.7]])
     disk = Domain(flat @ turned[:2], np.array([[0, 1, 2]]), np.arange(3), 1.0)
-    values = singular_values(frames(disk), flat @ np.transpose(stretch), disk.faces)
+    values = singular_values(
+        frames(disk.vertices, disk.faces), flat @ np.transpose(stretch), disk.faces
+    )
     assert_allclose(np.ravel(values), wanted, atol=1e-12)
 
 
