@@ -12,7 +12,6 @@ from parapoint.learned import presets
 from parapoint.learned.networks import Networks
 from parapoint.learned.presets import PRESETS
 from parapoint.surfaces.strays import fitted_rows
-from parapoint.testing import check_method
 
 TINY = {"preset": "paper", "points": 150, "subset": 100, "iterations": 6, "device": "cpu"}
 
@@ -25,10 +24,6 @@ def paraboloid(count: int = 400) -> np.ndarray:
 @pytest.fixture(scope="module")
 def fitted() -> ParaPoint:
     return ParaPoint(**TINY).fit(paraboloid())
-
-
-def test_it_keeps_the_promises_of_a_method() -> None:
-    check_method(ParaPoint(**{**TINY, "iterations": 2}))
 
 
 def test_every_preset_runs() -> None:

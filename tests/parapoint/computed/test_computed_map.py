@@ -13,7 +13,6 @@ from parapoint.computed.flattening import FlatMap, flat_map
 from parapoint.computed.reconstruction import ReconstructionError
 from parapoint.estimator import load
 from parapoint.fitting import Session
-from parapoint.testing import check_method
 
 
 def paraboloid(count: int = 400) -> np.ndarray:
@@ -70,10 +69,6 @@ def test_a_cloud_that_shows_no_surface_says_so() -> None:
     parts = [paraboloid(150) + np.array([100.0 * k, 0, 0]) for k in range(3)]
     with pytest.raises(ReconstructionError, match="the largest component holds 150 of 450"):
         ComputedMap().fit(np.concatenate(parts))
-
-
-def test_it_keeps_the_promises_of_a_method() -> None:
-    check_method(ComputedMap(points=1000))
 
 
 def test_no_network_takes_part() -> None:
