@@ -379,7 +379,7 @@ def _class(name: str) -> type[Method]:
     entry = _installed().get(name)
     if entry is None:
         if name in RENAMED:
-            raise InputError(f"{name} is called {RENAMED[name]} now")
+            raise InputError(f"there is no method {name!r}: its name is {RENAMED[name]}")
         raise InputError(f"there is no method {name!r}; {_near(name, names())}")
     with _foreign_code(f"the plugin {name} ({entry.value})"):
         module = importlib.import_module(entry.module)

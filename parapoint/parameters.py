@@ -10,6 +10,8 @@ from parapoint.errors import InputError
 
 LARGEST_SEED = 2**63 - 1
 """Largest seed: what torch takes and a column of a table holds."""
+MOST_THREADS = 1024
+"""Most threads that torch is asked for: a million of them end the process."""
 LONGEST_SECONDS = 1e9
 """Largest time, in seconds, that may be asked for: some thirty years."""
 LONGEST_VALUE = 200

@@ -24,6 +24,8 @@ THUMBNAIL = (480, 160)
 """Width and height in pixels of the picture in a notebook."""
 MOST_DRAWN = 20_000
 """Points that a figure draws at most."""
+FLATTEST = 0.01
+"""Least extent of the drawn box along an axis, as a share of its largest one."""
 
 
 def figure(points: FloatArray, uv: FloatArray, on_seam: BoolArray) -> Figure:
@@ -59,7 +61,8 @@ def figure(points: FloatArray, uv: FloatArray, on_seam: BoolArray) -> Figure:
     made = Plot(figsize=(9, 4.5), layout="constrained")
     space = made.add_subplot(1, 2, 1, projection="3d")
     space.scatter(points[:, 0], points[:, 1], points[:, 2], c=colours, s=2)
-    space.set_box_aspect(np.ptp(points, axis=0))
+    extent = np.ptp(points, axis=0)
+    space.set_box_aspect(np.maximum(extent, FLATTEST * extent.max()))
     plane = made.add_subplot(1, 2, 2)
     plane.scatter(uv[:, 0], uv[:, 1], c=colours, s=2)
     plane.set_aspect("equal")

@@ -202,7 +202,9 @@ def side_by_side(parts: Sequence[Fitted]) -> Fitted:
         "components": len(parts),
         "seconds": round(sum(float(str(of["seconds"])) for of in reports), 3),
     }
-    for name in ("iterations", "anchors", "missed"):
+    for name in ("iterations", "anchors", "missed", "divergences"):
         if name in report:
             report[name] = sum(int(str(of[name])) for of in reports)
+    if "start" in report:
+        report["start"] = ", ".join(dict.fromkeys(str(of["start"]) for of in reports))
     return Fitted(whole, IDENTITY, points, parts[0].trace, report)

@@ -26,6 +26,7 @@ STRAY = 1e6
 ALIKE = 1e-3
 """Most that a measure of the map of a similar surface differs by; more only if seeds do."""
 OTHER_SEEDS = (1, 2, 3)
+"""Seeds that show how much the maps of a method differ by seed alone."""
 SEEDS_APART = 2.0
 """Factor on the range of the measures over a few seeds, since other seeds may differ by more."""
 THINNEST = 1e-9
@@ -47,9 +48,9 @@ def check_method(method: Method, surface: Surface | None = None) -> None:
       corners are in the order of the mesh.
     - The same seed gives the same map, bit by bit, unless the method says that it is not
       `deterministic`. The arrays of the surface do not change.
-    - A similar surface, far from the origin and in another unit, or with a far vertex that belongs
-      to no face, has a map alike: what the map
-      does to lengths and areas differs by ALIKE at most, or by what seeds make it differ.
+    - A surface that is similar (far from the origin, in another unit), or that has one more vertex,
+      far away and in no face, gets a map that is alike: lengths and areas differ by ALIKE at most,
+      or by what seeds make them differ.
     - A trace counts up in steps and seconds, these from the start of the method, and its maps are
       finite and of the result's shape.
 

@@ -17,6 +17,7 @@ from parapoint.surfaces.surface import FloatArray
 NARROW, DEEP = (512, 512), (512, 512, 512)
 """Hidden layers of Cut and Unwrap, of Deform and Wrap."""
 EMBEDDING = 64
+"""Channels of each embedding."""
 REPULSION_NEIGHBOURS, REPULSION_SPACING = 8, 0.25
 """Of the unwrapping loss; ε is the spacing times L(Q) / √N."""
 

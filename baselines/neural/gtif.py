@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 class GTIF(SheetMethod):
     """One grid, folded onto the surface, then refined by a learned filter of a learned graph.
 
-    S. Chen, C. Duan, Y. Yang, D. Li, C. Feng and D. Tian 2019, "Deep unsupervised learning of 3D
+    S. Chen, C. Duan, Y. Yang, D. Li, C. Feng and D. Tian 2020, "Deep unsupervised learning of 3D
     point clouds via graph topology inference and filtering". A network folds a grid of points S;
     a graph joins each with others near it in the grid, by weights A that are inferred from where
     both lie in the grid and in space; the filter h(A) S, a polynomial of low order in A, refines

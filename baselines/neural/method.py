@@ -9,10 +9,10 @@ import igl
 import numpy as np
 from scipy.spatial import cKDTree
 
-from parapoint.errors import InputError
-from parapoint.learned.presets import Preset
+from parapoint.learned.presets import LARGEST, Preset
+from parapoint.parameters import LONGEST_SECONDS, check_number, check_whole
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization, TracePoint
-from parapoint.surfaces.sampling import training_points
+from parapoint.surfaces.sampling import FEWEST_POINTS, training_points
 from parapoint.surfaces.surface import FloatArray, Mesh, Surface
 
 if TYPE_CHECKING:
@@ -29,9 +29,10 @@ class NeuralMethod:
     """A map R³ → R² learned for one surface; base class of the rivals.
 
     Attributes:
-        points: training points, drawn as for ParaPoint.
+        points: training points, 100 at least, drawn as for ParaPoint.
         iterations: steps.
-        subset: points of a step, at most; see `Trainer` on time budgets.
+        subset: points of a step, 100 at least, or all if there are fewer; see `Trainer` on time
+            budgets.
         time_budget: seconds of training at most; the schedule follows the time where that ends
             sooner.
         on_cpu: whether it trains on the CPU even where there is a GPU.
@@ -52,11 +53,14 @@ class NeuralMethod:
         raise NotImplementedError
 
     def __post_init__(self) -> None:
-        for name in ("points", "iterations", "subset"):
-            if getattr(self, name) < 1:
-                raise InputError(f"{name} must be at least 1, not {getattr(self, name)}")
-        if self.time_budget is not None and not self.time_budget > 0:
-            raise InputError(f"time_budget must be a number of seconds, not {self.time_budget}")
+        for name, least in (
+            ("points", FEWEST_POINTS),
+            ("iterations", 1),
+            ("subset", FEWEST_POINTS),
+        ):
+            check_whole(name, getattr(self, name), least, LARGEST)
+        if self.time_budget is not None:
+            check_number("time_budget", self.time_budget, most=LONGEST_SECONDS, above=True)
 
     @property
     def deterministic(self) -> bool:

@@ -48,12 +48,6 @@ class Refinement(nn.Module):
         return moved
 
 
-def with_axes(uv: Tensor) -> Tensor:
-    """(3, N, 2) places (N, 2) and the two axes as tangents there."""
-    axes = torch.eye(2, dtype=uv.dtype)[:, None].expand(2, len(uv), 2)
-    return torch.cat([uv[None], axes])
-
-
 def jacobians(pushed: Tensor) -> Tensor:
     """(N, C, 2) of what a network made of `with_axes`."""
     return pushed[1:].permute(1, 2, 0)

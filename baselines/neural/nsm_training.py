@@ -7,8 +7,9 @@ from collections.abc import Iterator
 import torch
 from torch import Tensor, nn
 
-from baselines.neural.nsm_networks import Refinement, SurfaceMap, jacobians, with_axes
+from baselines.neural.nsm_networks import Refinement, SurfaceMap, jacobians
 from baselines.neural.nsm_samples import Samples
+from baselines.neural.sheets import with_axes
 
 RATES = (1e-2, 2e-3)
 """Learning rates at the start, of the surface map and of the refining one; they fall to 0."""

@@ -19,7 +19,9 @@ NEIGHBOURS = 6
 APART = 1.5
 """Distance in the square below which anchors repel each other, in cells of their grid."""
 SMOOTHNESS = 0.3
+"""Weight of the squared distances of neighbours beside the repulsion, both in cells."""
 RECONSTRUCTION = 1e3
+"""Weight of the squared error of anchors that are read back, in radii of the cloud, squared."""
 
 
 def embedded(

@@ -15,14 +15,18 @@ from scipy.spatial import Delaunay
 
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, PointCloud
 
-HALF_CYLINDER_LENGTH = 3.0
-CONE_HEIGHT = 2.0
+HALF_CYLINDER_LENGTH, CONE_HEIGHT = 3.0, 2.0
+"""In radii of the cylinder and of the cone's base."""
 WAVE_HEIGHT = 0.1
-ROLL_HEIGHT = 4.0
-ROLL_TURNS = (1.0, 2.5)
+"""In sides of the square that is waved."""
+ROLL_HEIGHT, ROLL_TURNS = 4.0, (1.0, 2.5)
+"""Of the spiral (t cos t, t sin t): its height in the unit of t, and the turns between its ends."""
 TORUS_RADII = (1.0, 0.4)
+"""Of the ring and of its tube."""
 SAMPLED_POINTS = 8_000
+"""Points of a built-in cloud."""
 DENSITY_RATIO = 10.0
+"""Density of the dense side of an uneven cloud over that of the thin one."""
 
 
 def grid_faces(rows: int, columns: int) -> IntArray:

@@ -253,7 +253,7 @@ def exact_points(case: str) -> PointCloud | None:
 
 
 def reference(case: str) -> Parameterization | None:
-    """The UV map that the model of a case came with; None if it came with none.
+    """The UV map that a model of the registry came with; None for any other case.
 
     Raises:
         InputError: as for `load`.

@@ -26,8 +26,8 @@ from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, PointClo
 NEIGHBOURS = 8
 """Nearest other points that count as the neighbours of a point: k."""
 WIDER = 1.5
-"""On scan lines a neighbourhood reaches this many times as far, counted in points, as is just
-enough to leave the line."""
+"""On scan lines neighbours are chosen from this many times as many nearest points as just reach the
+next line."""
 SEAM_NEIGHBOURS = 3
 """Nearest other points across which a seam is looked for: K_cut of ParaPoint. Its T_cut is
 `SPANNING_LENGTH`."""

@@ -30,7 +30,7 @@ PR_SET_CHILD_SUBREAPER = 36
 
 
 def adopt_orphans(*, is_parent: bool = True) -> None:
-    """Make this process the parent of all processes below it whose own parent ends, or no more."""
+    """Let this process adopt every process below it whose own parent ends; or stop it doing so."""
     if FORKS:
         ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, int(is_parent), 0, 0, 0)
 

@@ -23,6 +23,7 @@ SEAL_LENGTH = len(SEAL) + 64
 EPOCH = (1980, 1, 1, 0, 0, 0)
 """The date of every member: the oldest that ZIP knows."""
 BLOCK = 1 << 20
+"""Bytes that are hashed at a time."""
 
 
 def is_sealed(path: Path) -> bool:

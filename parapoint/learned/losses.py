@@ -16,7 +16,8 @@ EPSILON = 1e-12
 """Added under square roots whose gradient is infinite at 0: of distances, in the shape's radius;
 of stretches, in their own size, so that it stays small where a map shrinks all."""
 SMALLEST = 1e-30
-"""Added where all stretches may be 0, too."""
+"""Added beside EPSILON, in the fourth power of the shape's radius, so that no root is taken of 0
+where all stretches are 0."""
 
 LARGEST_LOG = 3.0
 """Deviation of a log area beyond which it counts as this much: 20 times too large or too small."""

@@ -15,7 +15,7 @@ from parapoint.fitting import Fitted, Progress, Session
 from parapoint.learned import presets
 from parapoint.learned.devices import device_of
 from parapoint.learned.presets import Preset
-from parapoint.parameters import check_whole
+from parapoint.parameters import MOST_THREADS, check_whole
 from parapoint.surfaces.frame import Frame
 from parapoint.surfaces.normals import are_outer, oriented_normals
 from parapoint.surfaces.parameterization import TracePoint
@@ -34,8 +34,6 @@ STARTING = 0.25
 """Share of the time budget after which a computed start is improved no more."""
 KEPT_MAPS = 8
 """Maps that go into the trace of `parameterize`, evenly over the run."""
-MOST_THREADS = 1024
-"""Most threads that torch is asked for: a million of them end the process."""
 
 
 @dataclass(repr=False)
@@ -153,6 +151,10 @@ class ParaPoint(Estimator):
         normals = oriented_normals(frame.inside(points))
         side = 1 if are_outer(surface, points, normals) else -1
         map_ = map_.seen_from(frame.inside(points), side * normals)
+        if map_.is_mirrored:
+            trace = tuple(
+                of._replace(uv=None if of.uv is None else of.uv * [-1, 1]) for of in trace
+            )
         return Fitted(map_, frame, points, trace, self._report(trainer, trace) | found)
 
     def _trainer(

@@ -207,7 +207,7 @@ LEARNED = Preset(
 """Ours, from a computed start. It departs from the text in this:
 
 - Networks: a smooth activation (a piecewise linear network has a piecewise constant Jacobian),
-  Fourier features of their inputs, and gates in Cut, which can so open a surface at once.
+  Fourier features of their inputs, and gates in Cut, which let it jump at a seam.
 - Start: in place of the hull a computed map, whose values and derivatives, and the sides of whose
   seams, the networks are taught (`parapoint.learned.start`, `parapoint.learned.taught`).
 - Losses: the conformal and the anti-flip term look at the map of the points (`unfolding_loss`)
@@ -238,7 +238,7 @@ PRESETS = {"paper": PAPER, "learned": LEARNED}
 RENAMED = {
     "fast": "the computed map is a method of its own: ComputedMap in Python, `computed` elsewhere",
     "computed": "it is a method of its own: ComputedMap in Python, `computed` elsewhere",
-    "smooth": 'it is called "learned" now',
+    "smooth": 'its name is "learned"',
 }
 """Names that a preset does not have, and what to say of each."""
 

@@ -17,6 +17,7 @@ from parapoint.learned.devices import device_of
 from parapoint.learned.features import FeatureNetworks
 from parapoint.learned.networks import ACTIVATIONS, Networks, SubNetworks, SurfaceNetworks
 from parapoint.learned.presets import Preset
+from parapoint.parameters import MOST_THREADS, check_whole
 from parapoint.surfaces.surface import FloatArray
 
 SEEN = 2_000
@@ -90,7 +91,11 @@ class TrainedMap:
 
     def facts(self) -> dict[str, Any]:
         """See `SurfaceMap`."""
-        return {"preset": self.preset.facts(), "is_mirrored": self.is_mirrored}
+        return {
+            "preset": self.preset.facts(),
+            "threads": self.threads,
+            "is_mirrored": self.is_mirrored,
+        }
 
     @classmethod
     def restored(cls, arrays: dict[str, np.ndarray], facts: dict[str, Any], device: str) -> Self:
@@ -107,7 +112,9 @@ class TrainedMap:
         networks = new_networks(preset, torch.Generator())
         networks.load_state_dict({n: torch.tensor(array) for n, array in arrays.items()})
         is_mirrored = facts.get("is_mirrored", False) is True  # models of older versions have none
-        return cls(networks.to(device_of(device)), preset, is_mirrored=is_mirrored)
+        if (count := facts.get("threads")) is not None:
+            check_whole("threads", count, 1, MOST_THREADS)
+        return cls(networks.to(device_of(device)), preset, count, is_mirrored)
 
 
 def new_networks(preset: Preset, generator: torch.Generator) -> SubNetworks:

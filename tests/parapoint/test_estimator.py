@@ -1,3 +1,4 @@
+import dataclasses
 import json
 import logging
 import math
@@ -12,6 +13,7 @@ from parapoint.learned import presets
 from parapoint.learned.networks import Networks
 from parapoint.learned.presets import PRESETS
 from parapoint.surfaces.strays import fitted_rows
+from parapoint.testing import irregular_disk
 
 TINY = {"preset": "paper", "points": 150, "subset": 100, "iterations": 6, "device": "cpu"}
 
@@ -57,7 +59,7 @@ def test_none_takes_the_preset_s_value() -> None:
         ({"preset": "best"}, "no preset 'best'; there are: paper, learned"),
         ({"preset": "computed"}, "no preset 'computed': it is a method of its own: ComputedMap"),
         ({"preset": "fast"}, "no preset 'fast': the computed map is a method of its own"),
-        ({"preset": "smooth"}, "no preset 'smooth': it is called \"learned\" now"),
+        ({"preset": "smooth"}, "no preset 'smooth': its name is \"learned\""),
         ({"points": 50}, "points must be a whole number of at least 100 .*, not 50"),
         ({"iterations": 0}, "iterations must be"),
         ({"iterations": 2.5}, "iterations must be"),
@@ -305,6 +307,33 @@ def test_threads_are_as_before_after_a_fit() -> None:
     model = ParaPoint(**TINY, threads=1).fit(paraboloid())
     assert torch.get_num_threads() == before
     assert model.report_["threads"] == 1
+
+
+def test_a_loaded_model_takes_as_many_threads_as_it_was_fitted_with(tmp_path) -> None:
+    ParaPoint(**TINY, threads=1).fit(paraboloid()).save(tmp_path / "model")
+    loaded = ParaPoint.load(tmp_path / "model")
+    assert loaded.fitted_.map.threads == loaded.threads == 1
+    file = tmp_path / "model" / "model.json"
+    facts = json.loads(file.read_text())
+    (where,) = (
+        of for of in (facts, *facts.values()) if isinstance(of, dict) and "is_mirrored" in of
+    )
+    where["threads"] = 10**6
+    file.write_text(json.dumps(facts))
+    with pytest.raises(InputError, match="threads must be a whole number"):
+        ParaPoint.load(tmp_path / "model")
+
+
+@pytest.mark.parametrize("is_mirrored", [False, True])
+def test_maps_along_the_way_are_seen_from_the_side_of_the_last_one(
+    is_mirrored, monkeypatch
+) -> None:
+    def seen_from(self, *_):
+        return dataclasses.replace(self, is_mirrored=is_mirrored)
+
+    monkeypatch.setattr("parapoint.learned.trained_map.TrainedMap.seen_from", seen_from)
+    made = ParaPoint(**TINY).parameterize(irregular_disk(), seed=0)
+    assert np.array_equal(made.trace[-1].uv, made.uv)
 
 
 def test_the_report_says_how_many_threads_torch_chose(fitted: ParaPoint) -> None:

@@ -38,6 +38,15 @@ def test_points_and_images_have_the_same_colours_and_seams_are_black():
     assert made._repr_png_().startswith(b"\x89PNG")
 
 
+@pytest.mark.parametrize("axis", range(3))
+def test_a_flat_cloud_is_drawn_flat(axis):
+    points = POINTS * np.where(np.arange(3) == axis, 0.0, 1.0)
+    made = figure(points, UV, np.zeros(4, dtype=bool))
+    box = np.asarray(made.axes[0]._box_aspect)
+    assert box[axis] / box.max() == picturing.FLATTEST
+    assert made._repr_png_().startswith(b"\x89PNG")
+
+
 @pytest.mark.parametrize(("count", "drawn"), [(9, 9), (10, 5), (11, 6), (20, 7), (100, 10)])
 def test_of_many_points_some_are_drawn(monkeypatch, count, drawn):
     monkeypatch.setattr(picturing, "MOST_DRAWN", 10)

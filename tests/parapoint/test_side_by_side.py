@@ -95,6 +95,13 @@ def test_the_report_of_several_maps_adds_up():
     assert "iterations" not in side_by_side([fitted(SQUARE), fitted(SQUARE)]).report
 
 
+def test_the_report_of_several_maps_hides_no_other_start_and_no_divergence():
+    starts = ["computed", "hull", "computed"]
+    parts = [fitted(SQUARE, start=of, divergences=k) for k, of in enumerate(starts)]
+    report = side_by_side(parts).report
+    assert (report["start"], report["divergences"]) == ("computed, hull", 3)
+
+
 def test_the_state_of_several_maps_names_the_component():
     parts = [fitted(SQUARE), fitted(4 * SQUARE + [10, 0, 5], 2.0)]
     whole = side_by_side(parts).map

@@ -117,10 +117,18 @@ def test_normals_are_those_of_the_mesh_or_of_the_cloud():
     np.testing.assert_array_equal(surface_normals(PointCloud(points, -points), points), -points)
 
 
+@pytest.mark.parametrize("value", [0, -1, 1e999, "9", True])
 @pytest.mark.parametrize("field", ["points", "iterations", "subset", "time_budget"])
-def test_a_budget_below_one_is_refused(field):
+def test_a_budget_that_a_training_would_refuse_is_refused_at_once(field, value):
     with pytest.raises(InputError, match=field):
-        FAM(**{field: 0})
+        FAM(**{field: value})
+
+
+@pytest.mark.parametrize("field", ["points", "subset"])
+def test_fewer_points_than_a_fit_takes_are_refused_at_once(field):
+    FAM(**{field: 100})
+    with pytest.raises(InputError, match=f"{field} must be a whole number of at least 100"):
+        FAM(**{field: 99})
 
 
 def test_the_rivals_train_on_all_points_as_they_are():

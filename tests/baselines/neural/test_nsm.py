@@ -8,7 +8,7 @@ import torch
 
 from baselines.hybrid import AutomaticSLIM
 from baselines.neural.nsm import NSM, flattened
-from baselines.neural.nsm_networks import Refinement, SurfaceMap, with_axes
+from baselines.neural.nsm_networks import Refinement, SurfaceMap
 from baselines.neural.nsm_samples import Triangles
 from baselines.neural.nsm_training import (
     ROUND,
@@ -18,6 +18,7 @@ from baselines.neural.nsm_training import (
     first_forms,
     overfit_terms,
 )
+from baselines.neural.sheets import with_axes
 from baselines.neural.stepping import trained
 from parapoint import clock
 from parapoint.errors import InputError
@@ -136,7 +137,7 @@ def test_the_map_is_the_isometric_one_lowered_further_between_the_vertices():
 
 def test_time_ends_it_and_the_steps_say_how_far_it_came():
     mesh = irregular_disk()
-    result = NSM(points=500, subset=64, time_budget=0.5).parameterize(mesh, seed=0)
+    result = NSM(points=500, subset=100, time_budget=0.5).parameterize(mesh, seed=0)
     fit, refinement = result.report["iterations"]
     assert 0 < fit < 8_500
     assert 0 < refinement < 8_500

@@ -154,7 +154,7 @@ def test_charts_are_packed_apart_and_shared_by_faces(surface):
 
 
 def test_several_charts_conform():
-    check_method(Nuvo(charts=3, points=120, subset=50, iterations=2), irregular_disk())
+    check_method(Nuvo(charts=3, points=120, subset=100, iterations=2), irregular_disk())
 
 
 def test_a_single_chart_is_as_it_was():
@@ -189,7 +189,7 @@ def test_several_charts_weigh_the_terms_as_one_does():
 
 
 def test_the_terms_are_weighed_and_their_sum_falls(monkeypatch):
-    small = {"charts": 2, "points": 120, "subset": 50}
+    small = {"charts": 2, "points": 120, "subset": 100}
     totals = [
         row.values["total"]
         for row in Nuvo(**small, iterations=8).parameterize(irregular_disk(), seed=0).trace
