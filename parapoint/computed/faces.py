@@ -65,6 +65,7 @@ def comparable(mesh: Mesh) -> Mesh:
         return mesh if simple is None else simple[0]
     vertices, faces = mesh.vertices, mesh.faces
     for _ in range(MOST_SPLITS):
-        if len(vertices) < LEAST_VERTICES:
+        # igl knows no neighbours of two faces that lie on one another, a mesh of their own.
+        if len(faces) > 2 and len(vertices) < LEAST_VERTICES:
             vertices, faces = igl.upsample(vertices, faces)
     return Mesh(vertices, faces)

@@ -15,6 +15,7 @@ from parapoint.surfaces.surface import flat_faces
 from parapoint.testing import irregular_disk, sphere
 
 DISK_AFTER_CUT = frozenset({"faces", "disk_after_cut"})
+REQUIRED = frozenset({"faces", "manifold", "oriented", "connected"})
 TETRAHEDRON = Mesh(
     [[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
 )
@@ -98,7 +99,7 @@ def test_a_littered_soup_becomes_the_surface_that_it_shows():
     odd = rng.permutation(len(faces))[:40]
     faces[odd] = faces[odd][:, ::-1]
     a, b, c = faces[5]
-    faces = np.concatenate([faces[:10], [[a, b, b], [c, b, a], [c, c, c]], faces[10:]])
+    faces = np.concatenate([faces[:10], [[a, b, b], [b, c, a], [c, c, c]], faces[10:]])
     lone = [[7.0, 7, 7]]
     soup = Mesh(
         np.concatenate([lone, whole.vertices[faces].reshape(-1, 3)]),
@@ -115,6 +116,64 @@ def test_a_littered_soup_becomes_the_surface_that_it_shows():
     assert [point.iteration for point in result.trace] == [1, 2]
     # Only the cut is a seam: the faces beside one without area are joined through the weld.
     assert len(np.unique(result.charts())) == 2  # the point is a chart of its own
+
+
+@pytest.mark.parametrize(
+    "sheet",
+    [
+        Mesh(np.eye(3), [[0, 1, 2]]),
+        Mesh(np.random.default_rng(1).random((6, 3)), [[0, 1, 2], [5, 4, 3]]),
+        irregular_disk(),
+        pages(3),
+        TETRAHEDRON,
+    ],
+    ids=["a triangle", "two apart", "a disk", "a book", "a closed surface, inside and outside"],
+)
+def test_the_two_sides_of_a_sheet_are_parted(sheet):
+    count = len(sheet.faces)
+    order = np.random.default_rng(0).permutation(2 * count)
+    both = np.concatenate([sheet.faces, sheet.faces[:, [0, 2, 1]]])[order]
+    preparation = prepared(Mesh(sheet.vertices, both), REQUIRED)
+    assert f"parted the two sides of {count} face" in preparation.steps
+    assert "duplicate" not in preparation.steps
+    result = preparation.joined(preparation.maps(Shadow(), 0))
+    front, back = (result.corners[np.isin(order, count * k + np.arange(count))] for k in (0, 1))
+    assert np.intersect1d(front, back).size == 0
+    assert "turned" not in preparation.steps
+    # The image of each face is its shadow, at the scale of its part.
+    at, uv = sheet.vertices[both][:, :, :2], result.uv[result.corners]
+    for k in range(3):
+        along, image = (of[:, (k + 1) % 3] - of[:, k] for of in (at, uv))
+        assert_allclose(along[:, 0] * image[:, 1], along[:, 1] * image[:, 0], atol=1e-9)
+        assert ((along * image).sum(axis=1) >= 0).all()
+
+
+@pytest.mark.parametrize("is_last", [False, True])
+def test_an_odd_face_that_turns_against_its_surface_is_the_other_side(is_last):
+    """Wherever it stands in the file, the surface stays as it is."""
+    whole = irregular_disk()
+    odd = whole.faces[[7], ::-1]
+    faces = np.concatenate([whole.faces, odd] if is_last else [odd, whole.faces])
+    preparation = prepared(Mesh(whole.vertices, faces), REQUIRED)
+    assert preparation.steps == "parted the two sides of 1 face; packed 2 components"
+    assert sorted(len(part.faces) for part in preparation.parts) == [1, len(whole.faces)]
+
+
+def test_a_one_sided_sheet_of_which_each_face_is_there_both_ways_is_mapped():
+    mesh = moebius()
+    both = Mesh(mesh.vertices, np.concatenate([mesh.faces, mesh.faces[:, ::-1]]))
+    preparation = prepared(both, REQUIRED)
+    assert f"parted the two sides of {len(mesh.faces)} faces" in preparation.steps
+    result = preparation.joined(preparation.maps(Shadow(), 0))
+    front, back = np.split(result.corners, 2)
+    assert np.intersect1d(front, back).size == 0
+
+
+def test_a_copy_that_turns_alike_lies_on_the_face_that_was_kept():
+    mesh = Mesh(DISK.vertices, np.concatenate([DISK.faces, DISK.faces[:, [1, 2, 0]]]))
+    preparation, result = mapped(mesh)
+    assert preparation.steps == "dropped 3 duplicate faces"
+    assert_array_equal(result.corners[:3], np.roll(result.corners[3:], 1, axis=1))
 
 
 def test_a_face_with_its_vertex_on_its_long_edge_leaves_no_slit():

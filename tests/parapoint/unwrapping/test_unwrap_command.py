@@ -1,6 +1,7 @@
 """`unwrap` of meshes: the same mesh with new UVs, and what is said of them."""
 
 import contextlib
+import io
 import json
 import math
 
@@ -12,6 +13,7 @@ from PIL import Image
 from parapoint import cli, clock
 from parapoint.commands.telling import ADVICE_OF_MESHES, warn
 from parapoint.commands.unwrapping import Request, _advice, _one_each, _warn_of_bound, expected
+from parapoint.files.meshes.gltf import opened
 from parapoint.files.reading import read_parameterized, read_surface
 from parapoint.surfaces.areas import LEAST_PART, MOST_STARVED
 from parapoint.surfaces.parameterization import Charted, Parameterization
@@ -263,6 +265,31 @@ def test_other_formats(box, tmp_path, capsys, caplog) -> None:
         assert held["corners"].shape == held["faces"].shape == (12, 3)
     unfold(box, tmp_path / "out.glb", capsys)
     assert len(read_surface(tmp_path / "out.glb").faces) == 12
+
+
+@pytest.mark.parametrize("faces", ["f 1 2 3", "f 1 2 3\nf 1 3 4", "f 1 2 3 4"])
+def test_the_two_sides_of_a_sheet_keep_their_own_colours(faces, tmp_path, capsys, caplog) -> None:
+    """A leaf: each face twice, wound the other way, with a material of its own."""
+    path = tmp_path / "leaf.obj"
+    (tmp_path / "leaf.mtl").write_text("newmtl front\nKd 1 0 0\nnewmtl back\nKd 0 0 1\n")
+    back = "\n".join(f"f {' '.join(reversed(face.split()[1:]))}" for face in faces.split("\n"))
+    corners = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+    path.write_text(f"mtllib leaf.mtl\n{corners}usemtl front\n{faces}\nusemtl back\n{back}\n")
+    out = tmp_path / "out.glb"
+    status, _, _ = run(["unwrap", path, "--out", out, "--texture", 64, "--json"], capsys)
+    assert status == 0
+    assert not caplog.messages or "left out" in caplog.text
+    picture = np.asarray(Image.open(io.BytesIO(opened(out).image(0))), dtype=int)
+    mesh, held = read_parameterized(out)
+    side = np.sign(
+        np.cross(
+            *(mesh.vertices[mesh.faces[:, k]] - mesh.vertices[mesh.faces[:, 0]] for k in (1, 2))
+        )[:, 2]
+    )
+    middle = held.uv[held.corners].mean(axis=1)
+    rows, columns = ((1 - middle[:, 1]) * 64).astype(int), (middle[:, 0] * 64).astype(int)
+    wanted = np.where(side[:, None] > 0, [255, 0, 0], [0, 0, 255])
+    assert np.abs(picture[rows, columns, :3] - wanted).max() <= 2
 
 
 @pytest.mark.parametrize("ending", [".npz", ".ply", ".obj", ".glb"])
