@@ -108,8 +108,8 @@ def _seeds(_: click.Context, __: click.Parameter, text: str | None) -> list[int]
 @click.option(
     "--memory",
     type=float,
-    help="GB a cell may hold, and a packed file decode to.  [default: four fifths of the "
-    "machine's, / jobs; 0.07 of a file]",
+    help="GB that a cell may hold, and that a packed file may decode to.  [default: 0.8 of the "
+    "machine's memory, shared out among the jobs; 0.07 for a file]",
 )
 @click.option(
     "--out",

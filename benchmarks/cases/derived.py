@@ -55,7 +55,8 @@ def check(model: str, how: str) -> None:
         InputError: the text after the @ asks for nothing that there is.
     """
     if how != DRAWN:
-        _sampling(how)
+        if how not in WAVES:
+            _sampling(how)
     elif not seam_file(model).is_file():
         drawn = ", ".join(sorted(path.stem for path in seam_file(model).parent.glob("*.txt")))
         raise InputError(f"nobody has drawn a seam on {model}; there is one on {drawn}")
@@ -90,8 +91,6 @@ def _sampling(how: str) -> dict[str, Any]:
     Raises:
         InputError: the text asks for nothing that there is.
     """
-    if how in WAVES:
-        return {"waves": WAVES[how]}
     if how == "uneven":
         return {"is_uneven": True}
     found = re.fullmatch(r"noise=(\d*\.?\d+)", how)

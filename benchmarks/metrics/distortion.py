@@ -94,7 +94,7 @@ def triangles(mesh: Mesh, parameterization: Parameterization) -> Triangles:
     sides = [points[(k + 2) % 3] - points[(k + 1) % 3] for k in range(3)]
     uv_sides = [images[(k + 2) % 3] - images[(k + 1) % 3] for k in range(3)]
 
-    double_area = _norm(np.cross(sides[2], -sides[1]))
+    double_area = lengths(np.cross(sides[2], -sides[1]))
     double_uv_area = cross(uv_sides[2], -uv_sides[1])
     no_area = _is_degenerate(double_area, sides)
     no_uv_area = _is_degenerate(np.abs(double_uv_area), uv_sides)
@@ -114,13 +114,14 @@ def triangles(mesh: Mesh, parameterization: Parameterization) -> Triangles:
     )
 
 
-def _norm(vectors: FloatArray) -> FloatArray:
+def lengths(vectors: FloatArray) -> FloatArray:
+    """(N,) the length of each of (N, k) vectors."""
     return np.asarray(np.sqrt(np.einsum("ij,ij->i", vectors, vectors)), dtype=np.float64)
 
 
 def _is_degenerate(double_area: FloatArray, sides: list[FloatArray]) -> BoolArray:
     """(F,) whether a triangle has no area. The coordinates lie within [-1, 1]."""
-    longest = np.maximum.reduce([_norm(side) for side in sides])
+    longest = np.maximum.reduce([lengths(side) for side in sides])
     height = np.maximum(SHORTEST_HEIGHT * longest, ROUNDING)
     return np.asarray(double_area <= longest * height)
 
@@ -139,7 +140,7 @@ def _singular_values(
     """Singular values (F,), (F,) of the maps that send the sides in 3D to those in UV."""
     a, b, uv_a, uv_b = sides[2], -sides[1], uv_sides[2], -uv_sides[1]
     known = double_area > 0
-    length = np.where(known, _norm(a), 1.0)
+    length = np.where(known, lengths(a), 1.0)
     height = np.where(known, double_area, 1.0) / length
     along = np.einsum("ij,ij->i", a, b) / length
     # In the plane of the face a is (length, 0) and b is (along, height). J maps a to uv_a and b to

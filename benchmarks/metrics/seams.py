@@ -27,7 +27,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.metrics.distortion import Triangles, power_above
+from benchmarks.metrics.distortion import Triangles, lengths, power_above
 from benchmarks.metrics.overlap import Overlaps, covered_area
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray, Mesh
@@ -73,7 +73,7 @@ def seam_length(seams: Seams) -> float:
     The boundary of the surface is no part of the cut. inf where a surface without area is cut.
     """
     start, end = seams.parameterization.seams(seams.mesh).T
-    length = _lengths(seams.mesh.vertices[end] - seams.mesh.vertices[start]).sum()
+    length = lengths(seams.mesh.vertices[end] - seams.mesh.vertices[start]).sum()
     return _ratio(float(length), float(np.sqrt(seams.triangles.area.sum())))
 
 
@@ -81,7 +81,7 @@ def uv_boundary_length(seams: Seams) -> float:
     """UV length of all chart boundaries over the root of the UV area (Shay et al.); inf without."""
     uv, parameterization = seams.parameterization.uv, seams.parameterization
     start, end = parameterization.edges[parameterization.edge_face_count == 1].T
-    length = float(_lengths(uv[end] - uv[start]).sum())
+    length = float(lengths(uv[end] - uv[start]).sum())
     return _ratio(length, float(np.sqrt(np.abs(seams.triangles.uv_area).sum())))
 
 
@@ -114,10 +114,6 @@ def _ratio(length: float, scale: float) -> float:
     return length / scale if scale > 0 else float("inf") if length > 0 else 0.0
 
 
-def _lengths(vectors: FloatArray) -> FloatArray:
-    return np.asarray(np.sqrt(np.einsum("ij,ij->i", vectors, vectors)), dtype=np.float64)
-
-
 def spanning_faces(
     mesh: Mesh, parameterization: Parameterization, overlapped: BoolArray
 ) -> BoolArray:
@@ -138,7 +134,7 @@ def spanning_edges(mesh: Mesh, parameterization: Parameterization) -> BoolArray:
     """(E,) whether an edge of `parameterization.edges` is spanning, by the same rule."""
     uv = parameterization.uv / power_above(parameterization.uv)
     edges, corners = parameterization.edges, parameterization.corners
-    uv_length = _lengths(uv[edges[:, 1]] - uv[edges[:, 0]])
+    uv_length = lengths(uv[edges[:, 1]] - uv[edges[:, 0]])
     spanning = uv_length > SPANNING_LENGTH * square_side(_used(parameterization, uv))
     # Only what is around long edges is looked at; these are few, unless the mesh is coarse.
     wanted = np.zeros(len(uv), dtype=bool)
@@ -146,7 +142,7 @@ def spanning_edges(mesh: Mesh, parameterization: Parameterization) -> BoolArray:
     near = np.flatnonzero(wanted[edges].any(axis=1))
     vertices = mesh.vertices / power_above(mesh.vertices)
     vectors = _vectors(vertices, mesh, parameterization, near)
-    length = _lengths(vectors)
+    length = lengths(vectors)
     known = length > 0
     near, vectors, length = near[known], vectors[known], length[known]
     stretch = uv_length[near] / length
@@ -225,7 +221,7 @@ def _usual_length(
         )
         around = face[first[end][candidate] + within]
         images = np.einsum("nij,nj->ni", jacobian[around], vectors[candidate])
-        usual = np.minimum(usual, _lower_quartiles(candidate, _lengths(images), len(ends)))
+        usual = np.minimum(usual, _lower_quartiles(candidate, lengths(images), len(ends)))
     return usual
 
 
