@@ -117,7 +117,8 @@ class Remote:
         """Hand on the outcome that the future of a task brings.
 
         Raises:
-            InputError: the scheduler has gone away, or a worker cannot run the project.
+            InputError: the scheduler has gone away, or a worker cannot run the project, has another
+                version of it, or has a full disk.
         """
         import distributed
 
@@ -126,6 +127,8 @@ class Remote:
             outcome = from_json(line, Outcome)
         except distributed.KilledWorker:
             outcome, content = Outcome("failed", WORKER_LOST), b""
+        except InputError:  # a ValueError, too: the worker cannot do any cell, and says why
+            raise
         except ValueError as error:
             outcome, content = Outcome("failed", f"its dask worker answered nonsense: {error}"), b""
         except (CancelledError, OSError):

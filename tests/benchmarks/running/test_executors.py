@@ -11,6 +11,7 @@ import stat
 import subprocess
 import sys
 import time
+from concurrent.futures import Future
 from pathlib import Path
 
 import psutil
@@ -18,7 +19,7 @@ import pytest
 
 from benchmarks.cases.suites import Suite
 from benchmarks.running import cluster, environment, executors, runner
-from benchmarks.running.tasks import Outcome
+from benchmarks.running.tasks import MeasureJob, Outcome, Task
 from benchmarks.store import measuring, verifying
 from benchmarks.store.results import Store
 from parapoint.errors import InputError
@@ -166,9 +167,32 @@ def test_a_run_on_two_workers_one_of_which_dies_gives_the_rows_of_a_local_one(
     wait_until(lambda: not any(psutil.pid_exists(cell) for cell in cells))
 
 
-def test_a_worker_of_another_version_ends_the_run_in_words():
-    with pytest.raises(InputError, match="has another version of the project"):
-        cluster.performed(b"", {}, [], 1, "another", modules=())
+class Workers:
+    """A client of a cluster whose workers do each task at once, in this process."""
+
+    def submit(self, function, *arguments, modules, **_):
+        future: Future = Future()
+        try:
+            future.set_result(function(*arguments, modules=modules))
+        except InputError as error:
+            future.set_exception(error)
+        return future
+
+
+def test_a_worker_of_another_version_ends_the_run_in_words(tmp_path, monkeypatch):
+    import distributed
+
+    monkeypatch.setattr(distributed, "wait", lambda *_, **__: None)
+    remote = cluster.Remote(lambda _: Workers(), tmp_path / "scratch", 1, lambda: None)
+    remote.project = "another"
+    surface = tmp_path / "surface.npz"
+    surface.touch()
+    ended = []
+    job = MeasureJob(surface=surface, time_limit=1, memory_limit=1, maps=())
+    task = Task(job, lambda: None, lambda *outcome: ended.append(outcome))
+    with remote, pytest.raises(InputError, match="has another version of the project"):
+        remote.run([task], 1)
+    assert not ended
 
 
 def test_a_cell_that_lost_two_workers_runs_again_next_time(tmp_path, monkeypatch):
