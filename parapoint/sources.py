@@ -104,14 +104,26 @@ def version(package: str) -> str:
 
 
 def _file(name: str) -> Path | None:
-    """The source file of a module; None where there is none of that name."""
+    """The source file of a module; None where there is none of that name.
+
+    No package is run to find it: one that refuses to run here has the same hash as elsewhere.
+    """
+    top, *rest = name.split(".")
     try:
-        spec = importlib.util.find_spec(name)
-    except (ModuleNotFoundError, ValueError):
+        spec = importlib.util.find_spec(top)
+    except ValueError:  # in memory without a spec, as what a program was started from
         return None
-    if spec is None or spec.origin is None or not spec.origin.endswith(".py"):
+    if spec is None:
         return None
-    return Path(spec.origin)
+    if not rest:
+        origin = spec.origin or ""
+        return Path(origin) if origin.endswith(".py") else None
+    for root in spec.submodule_search_locations or ():
+        place = Path(root, *rest)
+        for path in (place / "__init__.py", place.with_suffix(".py")):
+            if path.is_file():
+                return path
+    return None
 
 
 def _package(name: str, path: Path) -> str:

@@ -49,6 +49,22 @@ def test_names_that_the_package_offers_lead_to_their_modules(tmp_path, monkeypat
     assert "parapoint.learned.networks" in sources.sources("plugin_of_mine")
 
 
+def test_no_package_is_run_so_that_one_that_refuses_to_counts_as_elsewhere(tmp_path, monkeypatch):
+    (tmp_path / "toy" / "learned").mkdir(parents=True)
+    refuses = "from parapoint.errors import InputError\nraise InputError('needs a library')\n"
+    for file, text in {
+        "__init__.py": "",
+        "method.py": "def late():\n    from toy.learned.trainer import Trainer\n",
+        "learned/__init__.py": refuses,
+        "learned/trainer.py": "class Trainer: ...\n",
+    }.items():
+        (tmp_path / "toy" / file).write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    found = sources.sources("toy.method")
+    assert {"toy", "toy.method", "toy.learned", "toy.learned.trainer"} <= found.keys()
+    assert not {"toy", "toy.learned"} & sys.modules.keys()
+
+
 def test_a_module_that_is_not_there_is_an_error():
     with pytest.raises(ModuleNotFoundError, match=r"parapoint\.nothing"):
         sources.sources("parapoint.nothing")
