@@ -28,7 +28,7 @@ class AutomaticSLIM:
     price: float | None = PRICE
 
     requires: ClassVar[frozenset[str]] = frozenset({"faces", "disk_after_cut"})
-    packages: ClassVar[tuple[str, ...]] = ("libigl", "shapely")
+    packages: ClassVar[tuple[str, ...]] = ("libigl", "scipy", "shapely")
 
     def __post_init__(self) -> None:
         if self.price is not None:
@@ -62,7 +62,7 @@ class ArtistSLIM:
     """
 
     requires: ClassVar[frozenset[str]] = frozenset({"manifold", "oriented", "seams"})
-    packages: ClassVar[tuple[str, ...]] = ("libigl", "shapely")
+    packages: ClassVar[tuple[str, ...]] = ("libigl", "scipy", "shapely")
 
     def parameterize(self, surface: Surface, *, seed: int) -> Parameterization:  # noqa: ARG002 (nothing is random)
         """The map in the scale of the surface.

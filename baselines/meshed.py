@@ -66,7 +66,7 @@ class Meshed:
     flattening: Literal["xatlas", "lscm", "slim"] = "slim"
 
     requires: ClassVar[frozenset[str]] = frozenset({"points"})
-    packages: ClassVar[tuple[str, ...]] = ("pymeshlab", "libigl", "xatlas")
+    packages: ClassVar[tuple[str, ...]] = ("pymeshlab", "libigl", "xatlas", "scipy")
 
     def parameterize(self, surface: Surface, *, seed: int) -> PointParameterization:
         """The map of a cloud.

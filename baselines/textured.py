@@ -52,7 +52,7 @@ class Textured:
     texels: int = 2048
 
     requires: ClassVar[frozenset[str]] = frozenset({"points"})
-    packages: ClassVar[tuple[str, ...]] = ("pymeshlab", "libigl", "xatlas", "scipy")
+    packages: ClassVar[tuple[str, ...]] = ("pymeshlab", "libigl", "xatlas", "scipy", "shapely")
 
     def parameterize(self, surface: Surface, *, seed: int) -> PointParameterization:
         """The map of the mesh, at all points of the cloud.

@@ -35,6 +35,7 @@ class GridMethod(NeuralMethod):
     subset: int = 576
     time_budget: float | None = None
 
+    packages: ClassVar[tuple[str, ...]] = ("torch", "scipy")
     on_cpu: ClassVar[bool] = True
 
     def cells(

@@ -57,7 +57,7 @@ class NSM(NeuralMethod):
     subset: int = 256
 
     requires: ClassVar[frozenset[str]] = frozenset({"faces", "disk_after_cut"})
-    packages: ClassVar[tuple[str, ...]] = ("torch", "libigl", "shapely")
+    packages: ClassVar[tuple[str, ...]] = ("torch", "libigl", "scipy", "shapely")
     on_cpu: ClassVar[bool] = True
 
     def parameterize(self, surface: Surface, *, seed: int) -> Parameterization:

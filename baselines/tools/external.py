@@ -43,6 +43,7 @@ class External:
     recipe: str = ""
 
     requires: ClassVar[frozenset[str]] = frozenset({"faces"})
+    packages: ClassVar[tuple[str, ...]] = ("scipy",)
     deterministic: ClassVar[bool] = False  # a program makes no promise
 
     def __post_init__(self) -> None:

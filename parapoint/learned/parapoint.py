@@ -76,7 +76,7 @@ class ParaPoint(Estimator):
         threads: of the processor, None as torch has it.
     """
 
-    packages: ClassVar[tuple[str, ...]] = ("torch",)
+    packages: ClassVar[tuple[str, ...]] = ("torch", "libigl", "scipy", "shapely")
 
     preset: str = "learned"
     points: int | None = None

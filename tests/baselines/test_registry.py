@@ -1,3 +1,4 @@
+import importlib
 import os
 import subprocess
 import sys
@@ -129,6 +130,46 @@ def test_source_hash_follows_the_method_s_own_modules_and_its_libraries(monkeypa
     assert registry.source_hash(SLIM(iterations=5)) == hashes["slim"]  # parameters stand elsewhere
     monkeypatch.setattr(sources, "version", lambda package: f"{package} of tomorrow")
     assert registry.source_hash(SLIM()) != hashes["slim"]
+
+
+BESIDE_THE_MAP = {
+    "parapoint.surfaces.",  # what a surface is; it counts, compares and copies
+    "parapoint.files.",
+    "parapoint.method",  # asks torch for a GPU
+    "parapoint.estimator",
+    "parapoint.picturing",
+    "parapoint.saving",
+    "parapoint.planar.domains",  # asks libigl for areas
+    "baselines.neural.method",  # asks libigl for normals
+    # A computed map has these only because a trained one is opened by the same commands.
+    "parapoint.learned.devices",
+    "parapoint.learned.features",
+    "parapoint.learned.networks",
+    "parapoint.learned.trained_map",
+}
+"""Modules whose libraries decide no map, or the same one in every version."""
+EXACT = {"scipy.sparse", "scipy.sparse.csgraph", "scipy.spatial.cKDTree"}
+"""Matrices, graphs and nearest points, where nothing is rounded."""
+
+
+@pytest.mark.parametrize("name", registry.METHODS)
+def test_a_method_names_every_library_that_decides_its_map(name):
+    module, _, kind = registry.METHODS[name].partition(":")
+    kind = getattr(importlib.import_module(module), kind)
+    if registry.environment(kind):
+        return  # the run says which versions that one has
+    needed = set()
+    for source, path in sources.sources(module).items():
+        if source != module and source.startswith(tuple(BESIDE_THE_MAP)):
+            continue
+        package = source if path.name == "__init__.py" else source.rpartition(".")[0]
+        names = sources.imported(path.read_text(encoding="utf-8"), package)
+        whole = {name for name in names if not any(n.startswith(f"{name}.") for n in names)}
+        if source != module:
+            whole -= EXACT
+        needed |= {name.partition(".")[0] for name in whole}
+    needed -= {"numpy", *sources.PROJECT, *sys.stdlib_module_names}
+    assert {"libigl" if name == "igl" else name for name in needed} <= {*kind.packages}
 
 
 def test_source_hash_covers_the_preparation_of_those_that_need_one(monkeypatch):
