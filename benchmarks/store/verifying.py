@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from benchmarks.store.archives import (
     arrays_hash,
     map_arrays,
@@ -86,7 +88,8 @@ def _metric_faults(store: Store, rows: list[ResultRow], sample: int) -> Iterator
     known = values_by_key(stored_table(store))
     keys = metrics_keys(store, rows)
     measured = [row for row in rows if row.status == "ok" and keys[row.id] in known]
-    for row in measured[:: max(1, len(measured) // sample)][:sample]:
+    places = np.linspace(0, len(measured) - 1, min(sample, len(measured))).astype(int)
+    for row in (measured[place] for place in places):
         stored = known[keys[row.id]]
         for name, value in row_metrics(store, row).items():
             before = stored.get(name, math.nan)

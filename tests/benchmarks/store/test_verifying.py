@@ -100,11 +100,20 @@ def test_check_finds_a_metric_that_was_edited_in_the_last_of_many_rows(store):
     frame.to_parquet(store.folder / "metrics.parquet", index=False)
     (fault,) = verifying.faults(store)
     assert f"seed 6 ({rows[6].id}): symmetric_dirichlet is" in fault
-    # Three of seven, spread evenly: the seeds 0, 2 and 4.
-    assert not list(verifying.faults(store, sample=3))
-    frame.loc[4, "symmetric_dirichlet"] = np.nan
+    frame.loc[6, "symmetric_dirichlet"] = np.nan
     frame.to_parquet(store.folder / "metrics.parquet", index=False)
-    assert len(list(verifying.faults(store, sample=3))) == 1
+    assert len(list(verifying.faults(store))) == 1
+
+
+def test_the_sample_of_the_metrics_is_spread_over_all_rows(store, monkeypatch):
+    rows = [add(store, seed=seed) for seed in range(7)]
+    measuring.metrics(store)
+    computed = []
+    monkeypatch.setattr(verifying, "row_metrics", lambda _, row: computed.append(row.seed) or {})
+    for sample, seeds in {1: [0], 3: [0, 3, 6], 4: [0, 2, 4, 6], 20: list(range(7))}.items():
+        computed.clear()
+        assert not list(verifying._metric_faults(store, rows, sample))
+        assert computed == seeds
 
 
 def test_rounding_is_no_fault(store):
