@@ -37,9 +37,10 @@ class Suite:
     @property
     def digest(self) -> str:
         """16 hexadecimal digits over what makes results comparable: cases, their files, seeds."""
+        models = [registry().get(name.partition("@")[0]) for name in self.cases]
         files = [
-            registry()[name].sha256 if name in registry() else seam_digest(name)
-            for name in self.cases
+            (model.sha256 if model else "") + seam_digest(name)
+            for name, model in zip(self.cases, models, strict=True)
         ]
         text = json.dumps([self.name, self.version, self.cases, files, self.seeds])
         return hashlib.sha256(text.encode()).hexdigest()[:16]

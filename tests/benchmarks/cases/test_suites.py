@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 
 from baselines import registry
-from benchmarks.cases import derived, models
+from benchmarks.cases import derived, models, suites
 from benchmarks.cases.builtin import BUILTIN
 from benchmarks.cases.suites import SUITES, suite
 from parapoint import InputError
@@ -165,3 +165,13 @@ def test_a_drawn_seam_is_part_of_what_makes_results_comparable(tmp_path, monkeyp
     other.write_text("0 1\n")
     monkeypatch.setattr(derived, "seam_file", lambda _: other)
     assert SUITES["drawn"].digest != before
+
+
+@pytest.mark.parametrize("how", ["", "@noise=0.01", "@uneven", "@smooth", "@drawn"])
+def test_a_model_counts_for_what_is_made_from_it_as_well(how, monkeypatch):
+    model = "nefertiti-lowres_odedstein"
+    trial = suites.Suite("trial", "A trial", (model + how,), ())
+    before = trial.digest
+    other = dataclasses.replace(models.registry()[model], sha256="0" * 64)
+    monkeypatch.setattr(suites, "registry", lambda: {model: other})
+    assert trial.digest != before
