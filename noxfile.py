@@ -1,5 +1,6 @@
 """The project's commands: `nox` checks it, `nox -s bench` reproduces the tables."""
 
+import argparse
 import os
 
 import nox
@@ -56,23 +57,22 @@ def bench(session: nox.Session) -> None:
 
     `--with uvatlas` (or uvunwrap) first installs what these methods need.
     """
-    arguments = list(session.posargs)
-    wanted = []
-    while "--with" in arguments:
-        place = arguments.index("--with")
-        wanted += arguments[place + 1 : place + 2]
-        del arguments[place : place + 2]
-    if unknown := set(wanted) - {*EXTRAS}:
+    options = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    options.add_argument("--with", dest="extras", action="append", default=[])
+    options.add_argument("--out")
+    options.add_argument("--jobs")
+    given, arguments = options.parse_known_args(session.posargs)
+    if unknown := set(given.extras) - {*EXTRAS}:
         session.error(f"--with takes {', '.join(EXTRAS)}; not {', '.join(unknown)}")
-    install(session, *wanted)
+    install(session, *given.extras)
     if not arguments or arguments[0].startswith("-"):
         arguments.insert(0, "paper")
-    if "--out" not in arguments:
-        arguments += ["--out", f"results/{arguments[0]}"]
-    if "--jobs" not in arguments:  # two cells with a thread each end sooner than one with two
-        arguments += ["--jobs", str(min(os.cpu_count() or 1, 8))]
+    out = given.out or f"results/{arguments[0]}"
+    # Two cells with a thread each end sooner than one with two.
+    jobs = given.jobs or str(min(os.cpu_count() or 1, 8))
+    arguments += ["--out", out, "--jobs", jobs]
     session.run("python", "-m", "benchmarks", "run", *arguments)
-    session.run("python", "-m", "reports", arguments[arguments.index("--out") + 1])
+    session.run("python", "-m", "reports", out)
 
 
 @nox.session
