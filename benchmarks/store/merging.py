@@ -95,7 +95,7 @@ def _join(stores: Sequence[tuple[Path, Store]], into: Store) -> Merged:
     with into.writing():
         for path, store in stores:
             numbers = [into.add_run(entry) for entry in store.environment()["runs"]]
-            wanted = []
+            wanted, alike = [], []
             for row in store.rows():
                 first = kept.get(row.cell)
                 if first is None:
@@ -103,9 +103,10 @@ def _join(stores: Sequence[tuple[Path, Store]], into: Store) -> Merged:
                     wanted.append(row)
                 elif (first.id, first.uv_sha256) == (row.id, row.uv_sha256):
                     merged.same += 1
+                    alike.append(row)
                 else:
                     merged.contested.append(f"{row.case}, {row.method}, seed {row.seed}: {path}")
-            faults = publishing.supply_surfaces(store, into, wanted)
+            faults = publishing.supply_surfaces(store, into, [*wanted, *alike])
             if faults:
                 case, reason = next(iter(faults.items()))
                 raise InputError(f"{path}: {case}: {reason}")

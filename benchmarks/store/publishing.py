@@ -200,15 +200,17 @@ def published_metrics(store: Store) -> dict[str, dict[str, float]]:
 def supply_surfaces(store: Store, into: Files, rows: list[ResultRow]) -> dict[str, str]:
     """Store the surface of each row `into` a folder: from the rows' own, or by the model's name.
 
+    A file that is there stays; one that only the rows' own folder has joins it.
+
     Returns:
         By case, why its surface could not be had: it cannot be loaded, or is another one here.
     """
     faults: dict[str, str] = {}
     for case, name in dict.fromkeys((row.case, row.surface_hash) for row in rows):
-        if not name or into.surface_path(name).exists():
+        if not name:
             continue
-        if store.surface_path(name).exists():
-            _copy(store, into, name)
+        _copy(store, into, name)
+        if into.surface_path(name).exists():
             continue
         try:
             surface = models.load(case) if is_public(case) else None
@@ -232,8 +234,8 @@ def _is_named(arrays: Mapping[str, Any], name: str) -> bool:
 
 
 def _copy(store: Files, into: Files, surface_hash: str) -> None:
-    """Copy the files of a surface from one folder to another."""
+    """Copy those files of a surface from one folder to another that are not there yet."""
     for here, there in zip(store.paths_of(surface_hash), into.paths_of(surface_hash), strict=True):
-        if here.exists():
+        if here.exists() and not there.exists():
             there.parent.mkdir(parents=True, exist_ok=True)
             there.write_bytes(here.read_bytes())

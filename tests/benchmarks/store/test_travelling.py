@@ -94,6 +94,17 @@ def test_all_files_of_a_surface_come_with_it(
     assert [path.read_bytes() for path in made.paths_of(row.surface_hash)] == files[0]
 
 
+@pytest.mark.parametrize("method", ["flat", "other"])
+def test_a_reference_that_a_later_source_alone_has_is_merged(tmp_path: Path, method: str) -> None:
+    write(tmp_path / "a", "wavy_sheet")
+    later = write(tmp_path / "b", "wavy_sheet", method=method)
+    (row,) = later.rows()
+    later.add_reference(row.surface_hash, flat()[1])
+    merging.merge([tmp_path / "a", tmp_path / "b"], tmp_path / "c")
+    merged = Store(tmp_path / "c").reference_path(row.surface_hash)
+    assert merged.read_bytes() == later.reference_path(row.surface_hash).read_bytes()
+
+
 def scores(store, rows):
     return {row.id: measuring.row_metrics(store, row) for row in rows}, {}
 
