@@ -236,8 +236,8 @@ def source_hash(made: Method) -> str:
     It covers the source of the method's module, of all that this one imports from this project or
     from its own package, and the versions of the libraries that the class names in `packages`.
     In an environment of its own these may differ from what is installed here: there the run says
-    which versions it had. Where the surface may be changed before the method sees it, the hash
-    covers how.
+    which versions it had, and a later run compares them. Where the surface may be changed before
+    the method sees it, the hash covers how.
     """
     modules = [type(made).__module__]
     if made.requires & REPAIRED:

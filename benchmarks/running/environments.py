@@ -85,6 +85,11 @@ def made(requirements: Sequence[str], tell: Callable[[Path], None]) -> Environme
         raise MissingError(f"{', '.join(requirements)}: {said}") from None
 
 
+def found(requirements: Sequence[str]) -> Environment | None:
+    """The environment that has `requirements`, if an earlier run has made it."""
+    return _read(_folder(requirements))
+
+
 def _folder(requirements: Sequence[str]) -> Path:
     """Where the environment with these requirements is, over the environment of this process."""
     parts = [requirements, sys.version, platform.platform(), sys.prefix]

@@ -12,7 +12,7 @@ from typing import Any, cast
 from baselines import registry
 from benchmarks.cases import models
 from benchmarks.cases.suites import Suite
-from benchmarks.running import environment
+from benchmarks.running import environment, environments
 from benchmarks.running.cluster import WORKER_LOST
 from benchmarks.store.records import plain
 from benchmarks.store.results import Store
@@ -234,15 +234,23 @@ def plan(
     """
     rows = {row.cell: row for row in store.rows()}
     runs = store.environment()["runs"]
+    own = {method.environment: _own_versions(method.environment) for method in chosen}
     planned, kept = [], []
     for method, blank in _blanks(suite, chosen, hashes, here["threads"]):
         row = rows.get(blank.cell)
-        why = "new" if row is None else changed(blank, row, store, runs, here)
+        versions = own[method.environment]
+        why = "new" if row is None else changed(blank, row, store, runs, here, own=versions)
         if why:
             planned.append(Cell(blank, method, why))
         elif row is not None:
             kept.append(row)
     return planned, kept
+
+
+def _own_versions(requirements: tuple[str, ...]) -> dict[str, Mapping[str, str]]:
+    """What the environment with these requirements has, as a run notes it; empty without one."""
+    found = environments.found(requirements) if requirements else None
+    return {", ".join(requirements): found.versions} if found else {}
 
 
 def _blanks(
@@ -275,6 +283,8 @@ def changed(
     store: Store,
     runs: Sequence[Mapping[str, Any]],
     here: Mapping[str, Any],
+    *,
+    own: Mapping[str, Mapping[str, str]] = {},
 ) -> str:
     """Why a cell that has a row must run again; "" if it need not.
 
@@ -284,6 +294,7 @@ def changed(
         store: where its map should be.
         runs: the environments of all runs so far.
         here: the environment of this run, with its limits.
+        own: by its requirements, what the environment that its method has of its own holds now.
     """
     if not cell.surface_hash:  # the model cannot be had now: what is known of it stays
         return ""
@@ -292,6 +303,9 @@ def changed(
     if row.surface_hash != cell.surface_hash:
         return "model changed" if row.surface_hash else "model was missing"
     there = runs[row.run] if 0 <= row.run < len(runs) else {}
+    noted = there.get("environments", {})
+    if any(noted.get(needed, versions) != versions for needed, versions in own.items()):
+        return "libraries changed"
     before = there.get("threads") if row.threads is None else row.threads  # of older rows
     if cell.threads is not None and before != cell.threads:
         return "other number of threads"

@@ -6,7 +6,8 @@ import pytest
 
 from baselines import registry
 from benchmarks.cases import models
-from benchmarks.running import environment, planning
+from benchmarks.cases.suites import Suite
+from benchmarks.running import environment, environments, planning
 from benchmarks.store.results import Store
 from benchmarks.store.rows import ResultRow, identity
 from parapoint.errors import InputError
@@ -95,9 +96,12 @@ def test_a_file_that_is_gone_is_bad_input(tmp_path, monkeypatch):
         planning._origin(str(path), "readers")
 
 
+SURFACE = "0123abcd"
+
+
 def counted(threads: int | None, **given: object) -> ResultRow:
     fields = {"suite": "trial", "case": "c", "method": "fam", "params": {}, "seed": 0}
-    fields |= {"source_hash": "abc", "surface_hash": "def", "threads": threads}
+    fields |= {"source_hash": "abc", "surface_hash": SURFACE, "threads": threads}
     return ResultRow(id=identity(**fields), status="failed", **fields, **given)
 
 
@@ -120,3 +124,30 @@ def test_methods_that_torch_computes_count_threads_and_say_so():
     for name in ("computed", "slim", "tutte"):
         assert not registry.depends_on_threads(registry.method(name)[1])
         assert "threads" not in registry.describe(name).deterministic
+
+
+@pytest.mark.parametrize(
+    ("noted", "made", "reasons"),
+    [
+        ({"one>=1": {"one": "1"}}, {"one": "1"}, []),
+        ({"one>=1": {"one": "1"}}, {"one": "2"}, ["libraries changed"]),
+        ({"one>=1": {"one": "1"}}, None, []),  # no environment is there to tell
+        ({}, {"one": "2"}, []),  # it was skipped, or is older than what a run notes
+    ],
+)
+def test_a_cell_runs_again_once_its_own_environment_has_other_versions(
+    tmp_path, monkeypatch, noted, made, reasons
+):
+    now = made and environments.Environment(tmp_path, made)
+    monkeypatch.setattr(environments, "found", lambda _: now)
+    trial = Suite("trial", "A trial", ("c",), ("fam",))
+    method = planning.Chosen("fam", "fam", {}, "abc", (), environment=("one>=1",))
+    here = dict.fromkeys(environment.MACHINE, "here") | {"threads": 1}
+    store = Store(tmp_path)
+    with store.writing():
+        run = store.add_run(here | {"environments": noted})
+        store.append(counted(None, run=run))
+    planned, _ = planning.plan(trial, [method], {"c": SURFACE}, store, here)
+    assert [cell.why for cell in planned] == reasons
+    # Where the model is gone, what is known of it stays.
+    assert planning.plan(trial, [method], {"c": ""}, store, here)[0] == []
