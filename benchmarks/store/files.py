@@ -114,11 +114,15 @@ class Files:
         return name
 
     def add_reference(self, surface_hash: str, reference: Parameterization) -> None:
-        """Store the map that a surface came with, unless it is there already."""
-        path = self.reference_path(surface_hash)
+        """Store the map that a surface came with, unless that very map is there already."""
+        path, arrays = self.reference_path(surface_hash), map_arrays(reference)
+        try:
+            is_there = arrays_hash(read_arrays(path)) == arrays_hash(arrays)
+        except InputError:
+            is_there = False
         with disk_said(path):
-            if not path.exists():
-                write_arrays(path, map_arrays(reference), sealed=True)
+            if not is_there:
+                write_arrays(path, arrays, sealed=True)
 
     def add_exact(self, surface_hash: str, cloud: PointCloud) -> None:
         """Store the points of a noisy cloud without their noise, unless they are there already."""

@@ -126,10 +126,14 @@ def row_metrics(store: Store, row: ResultRow) -> dict[str, float]:
 def metrics_keys(store: Store, rows: Sequence[ResultRow]) -> dict[str, str]:
     """By row id, a hash of all that a row's metrics depend on: map, references, their source."""
     source = source_hash("benchmarks.metrics.evaluation")
-    references = {path.stem for path in (store.folder / "references").glob("*.npz")}
+    references = {
+        path.stem: hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in (store.folder / "references").glob("*.npz")
+        if path.is_file()
+    }
     exact = {path.stem for path in (store.folder / "exact").glob("*.npz")}
     texts = {
-        row.id: f"{row.id} {row.uv_sha256} {row.surface_hash in references} "
+        row.id: f"{row.id} {row.uv_sha256} {references.get(row.surface_hash, False)} "
         f"{row.surface_hash in exact} {source}"
         for row in rows
     }

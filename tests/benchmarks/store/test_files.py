@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.store.archives import read_surface
+from benchmarks.store.archives import read_map, read_surface
 from benchmarks.store.files import Files
 from benchmarks.store.results import Store
 from parapoint.errors import InputError
@@ -26,10 +26,21 @@ def test_what_is_stored_is_never_written_again(tmp_path):
     paths = [files.surface_path(name), files.reference_path(name), files.exact_path(name)]
     first = [path.stat().st_ino for path in paths]  # what is written anew is another file
     assert files.add_surface(SQUARE) == name
-    files.add_reference(name, Parameterization(FLAT.uv * 2, FLAT.corners))
+    files.add_reference(name, FLAT)
     files.add_exact(name, CLOUD)
     assert [path.stat().st_ino for path in paths] == first
     np.testing.assert_array_equal(read_surface(files.exact_path(name)).points, EXACT.points)
+
+
+@pytest.mark.parametrize("damaged", [False, True])
+def test_a_reference_is_renewed_once_it_is_another_or_damaged(tmp_path, damaged):
+    files = Files(tmp_path)
+    name = files.add_surface(SQUARE)
+    files.add_reference(name, FLAT)
+    if damaged:
+        files.reference_path(name).write_bytes(b"PK")
+    files.add_reference(name, Parameterization(FLAT.uv * 2, FLAT.corners))
+    np.testing.assert_array_equal(read_map(files.reference_path(name)).uv, FLAT.uv * 2)
 
 
 def test_a_noisy_cloud_is_scored_on_its_points_without_noise(tmp_path):

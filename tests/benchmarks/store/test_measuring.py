@@ -62,6 +62,9 @@ def test_a_reference_joins_the_metrics_and_asks_for_them_anew(store):
     assert [found.id for found in measuring.unmeasured(store)] == [row.id]
     # log sigma varies over the stretched map and not over the reference: no correlation.
     assert measuring.metrics(store)["artist_correlation"].tolist() == [1]
+    assert not measuring.unmeasured(store)
+    store.add_reference(row.surface_hash, Parameterization(FLAT.uv * 2, FLAT.corners))
+    assert [found.id for found in measuring.unmeasured(store)] == [row.id]
 
 
 def test_a_damaged_table_is_made_anew(store, caplog):
