@@ -29,13 +29,12 @@ from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from parapoint import clock
 from parapoint.method import REQUIREMENTS, Method, UnsupportedError
 from parapoint.surfaces.cutting import cut_along, cut_to_disk
 from parapoint.surfaces.parameterization import Parameterization, PointParameterization, TracePoint
+from parapoint.surfaces.sides import other_sides, parted
 from parapoint.surfaces.surface import (
     BoolArray,
     FloatArray,
@@ -166,7 +165,7 @@ def _meets(mesh: Mesh, words: frozenset[str]) -> bool:
         ("manifold" not in words or mesh.is_manifold)
         and ("oriented" not in words or mesh.is_oriented)
         and ("oriented" not in words or not flat_faces(mesh.vertices, mesh.faces).any())
-        and ("oriented" not in words or not _are_other_sides(mesh.faces).any())
+        and ("oriented" not in words or not other_sides(mesh.faces).any())
         and ("connected" not in words or mesh.component_count == 1)
     )
 
@@ -193,7 +192,7 @@ def _repaired(mesh: Mesh, words: frozenset[str]) -> tuple[list[Mesh], list[str],
     flat = flat_faces(whole.vertices, faces)
     count = int((~solid).sum() + flat.sum())
     note(count, "dropped", "face without area", "faces without area")
-    is_other = _are_other_sides(faces)
+    is_other = other_sides(faces)
     single = _first_of_each(np.column_stack([np.sort(faces, axis=1), is_other]))
     kept, is_other = single & ~flat, is_other[single & ~flat]
     note(int((~single & ~flat).sum()), "dropped", "duplicate face")
@@ -205,12 +204,11 @@ def _repaired(mesh: Mesh, words: frozenset[str]) -> tuple[list[Mesh], list[str],
         "unreferenced vertices",
     )
     place = faces[kept]  # welded vertex at each corner, whatever copies the next steps make
-    apart = place + len(whole.vertices) * is_other[:, None]
-    made = Mesh(np.tile(whole.vertices, (1 + int(is_other.any()), 1)), apart)
+    made = parted(Mesh(whole.vertices, place), is_other)
     if "manifold" in words:
         fans = cut_along(made, made.edges[made.edge_face_count > 2])
         note(int((made.edge_face_count > 2).sum()), "split", "non-manifold edge")
-        copied = np.unique(place[fans.faces != apart])
+        copied = np.unique(place[fans.faces != made.faces])
         note(len(copied), "split", "non-manifold vertex", "non-manifold vertices")
         made = fans
     if "oriented" in words:
@@ -227,56 +225,6 @@ def _repaired(mesh: Mesh, words: frozenset[str]) -> tuple[list[Mesh], list[str],
     parts = [compact(made.vertices, faces) for faces in np.split(made.faces[order], bounds)]
     note(len(parts) if len(parts) > 1 else 0, "packed", "component")
     return parts, steps, _origin(whole.faces, place[order], is_other[order])
-
-
-def _are_other_sides(faces: IntArray) -> BoolArray:
-    """(F,) whether a face has the corners of another one, and is on the other side of its sheet.
-
-    Faces that turn alike across their edges are on one side. The other side is the smaller one: of
-    a surface it is the odd face that is there both ways. On a one-sided sheet the second face of
-    each pair counts as the other side.
-    """
-    _, first, triple = np.unique(
-        np.sort(faces, axis=1), axis=0, return_index=True, return_inverse=True
-    )
-    triple, rows, least = triple.reshape(-1), np.arange(len(faces)), faces.argmin(axis=1)
-    turn = (faces[rows, (least + 1) % 3] < faces[rows, (least + 2) % 3]).astype(np.int64)
-    is_second: BoolArray = np.asarray(turn != turn[first[triple]], dtype=bool)
-    is_double: BoolArray = np.asarray(np.isin(triple, triple[is_second]), dtype=bool)
-    if not is_double.any():
-        return is_second
-    side = _sides(faces, triple, turn)
-    size = np.bincount(side[2 * triple + turn], minlength=len(side))
-    own, across = side[2 * triple + turn], side[2 * triple + 1 - turn]
-    smaller = np.where(size[own] == size[across], own > across, size[own] < size[across])
-    return is_double & np.where(own == across, is_second, smaller)
-
-
-def _sides(faces: IntArray, triple: IntArray, turn: IntArray) -> IntArray:
-    """(2 T,) the side that each of T triples of corners is on in either turn.
-
-    Sides go on across the edges of two triples.
-
-    Args:
-        faces: (F, 3).
-        triple: (F,) the number of each face's corners, whichever way it turns.
-        turn: (F,) which way it turns, 0 or 1.
-    """
-    size = 2 * (int(triple.max()) + 1)
-    start, end = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
-    key = np.minimum(start, end) * (int(faces.max()) + 1) + np.maximum(start, end)
-    node = np.repeat(2 * triple + turn, 3)
-    pairs = np.unique(np.stack([key, node // 2], axis=1), axis=0)
-    keys, begin, count = np.unique(pairs[:, 0], return_index=True, return_counts=True)
-    edge = np.searchsorted(keys, key)
-    is_link = count[edge] == 2
-    slot = 2 * (start < end) + (node // 2 != pairs[begin[edge], 1])
-    met = np.full((len(keys), 4), -1)
-    met[edge[is_link], slot[is_link]] = node[is_link]
-    links = np.concatenate([met[:, [0, 3]], met[:, [1, 2]]])
-    links = links[(links >= 0).all(axis=1)]
-    graph = sparse.coo_matrix((np.ones(len(links), bool), links.T), (size, size))
-    return np.asarray(csgraph.connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
 def _first_of_each(rows: IntArray) -> BoolArray:
@@ -340,7 +288,7 @@ def _origin(faces: IntArray, made: IntArray, is_other: BoolArray) -> IntArray:
         """(N,) one number for each undirected pair (N, 2) of vertices."""
         return np.asarray(np.sort(pairs, axis=1) @ [int(faces.max()) + 1, 1], dtype=np.int64)
 
-    sides = np.concatenate([is_other, _are_other_sides(faces)])
+    sides = np.concatenate([is_other, other_sides(faces)])
     both = np.column_stack([np.sort(np.concatenate([made, faces]), axis=1), sides])
     _, triple = np.unique(both, axis=0, return_inverse=True)
     twin = found(triple.reshape(-1)[: len(made)], triple.reshape(-1)[len(made) :])

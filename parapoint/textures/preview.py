@@ -11,6 +11,7 @@ from scipy import ndimage
 from parapoint.files.png import png
 from parapoint.files.targets import complete_file, sealed_png
 from parapoint.surfaces.parameterization import Charted
+from parapoint.surfaces.sides import parted
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, vertex_normals
 from parapoint.textures.texels import texels
 
@@ -24,6 +25,9 @@ R2 = (0.7548776662466927, 0.5698402909980532)
 """1 / g and 1 / g² with g³ = g + 1."""
 AMBIENT = 0.35
 """Share of the light that comes from all sides."""
+BEHIND = 4.0
+"""How far points that face away are put back, in pixels, so that the side of a sheet that faces the
+viewer hides the other one, which lies in the same place."""
 PAPER = 255
 AROUND = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], dtype=bool)
 """The eight pixels around one."""
@@ -49,7 +53,7 @@ def preview(charted: Charted, texture: Picture, *, is_y_up: bool = False) -> Pic
         texture: (N, N, 3) pixels, first row at the top.
         is_y_up: whether the y axis points upwards, and not z.
     """
-    mesh, held = charted
+    mesh, held = parted(charted.mesh), charted.map
     face, weights = _evenly_spread(mesh)
     points, normals, uv = (
         np.einsum("nc,ncd->nd", weights, values[rows[face]])
@@ -88,7 +92,10 @@ def _looked_up(texture: Picture, uv: FloatArray) -> Picture:
 
 
 def _seen(points: FloatArray, normals: FloatArray, colours: Picture, side: FloatArray) -> Picture:
-    """(SIDE, SIDE, 3) the points seen from one side, shaded, the nearest in front."""
+    """(SIDE, SIDE, 3) the points seen from one side, shaded, the nearest in front.
+
+    Of two sides of a sheet that is one that faces there.
+    """
     towards = side / np.linalg.norm(side)
     right = np.cross([0.0, 0.0, 1.0], towards)
     right /= np.linalg.norm(right)
@@ -97,7 +104,9 @@ def _seen(points: FloatArray, normals: FloatArray, colours: Picture, side: Float
     extent = max(float((high - low)[:2].max()), 1e-300)
     at = 0.5 + 0.92 * (placed - (low + high) / 2)[:, :2] / extent
     column, line = (SIDE * at[:, 0]).astype(np.int64), (SIDE * (1 - at[:, 1])).astype(np.int64)
-    light = AMBIENT + (1 - AMBIENT) * np.abs(normals @ towards)
+    facing = normals @ towards
+    light = AMBIENT + (1 - AMBIENT) * np.abs(facing)
+    placed[:, 2] -= np.where(facing < 0, BEHIND / SIDE * extent, 0)
     order = np.argsort(placed[:, 2], kind="stable")  # of one pixel the last one, the nearest, stays
     line, column = line[order], column[order]
     picture = np.full((SIDE, SIDE, 3), PAPER, dtype=np.uint8)

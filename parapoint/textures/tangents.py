@@ -9,6 +9,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from parapoint.surfaces.parameterization import Charted
+from parapoint.surfaces.sides import parted
 from parapoint.surfaces.surface import FloatArray, IntArray, vertex_normals
 from parapoint.textures.texels import Texels
 
@@ -70,9 +71,10 @@ def in_tangent_space(shown: Texels) -> Callable[[FloatArray, slice], FloatArray]
     The second axis is the direction in which v grows. As a viewer does, the interpolated tangent
     and normal are taken as they come, without making them orthogonal or of length 1.
     """
-    normals = vertex_normals(shown.charted.mesh)
-    tangents, hand = corner_tangents(shown.charted, normals)
-    corner_normals = normals[shown.charted.mesh.faces]
+    mesh = parted(shown.charted.mesh)
+    normals = vertex_normals(mesh)
+    tangents, hand = corner_tangents(Charted(mesh, shown.charted.map), normals)
+    corner_normals = normals[mesh.faces]
 
     def seen(space: FloatArray, rows: slice) -> FloatArray:
         faces, weights = shown.faces[rows], shown.weights(rows)

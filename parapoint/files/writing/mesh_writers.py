@@ -13,6 +13,7 @@ from parapoint.errors import InputError
 from parapoint.files.png import png
 from parapoint.files.targets import beside, complete_file, sealed_png, sealed_text
 from parapoint.surfaces.parameterization import Charted, Parameterization
+from parapoint.surfaces.sides import parted
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, vertex_normals
 
 
@@ -112,7 +113,7 @@ class _Split(NamedTuple):
 
     @classmethod
     def of(cls, charted: Charted) -> Self:
-        mesh, held = charted
+        mesh, held = parted(charted.mesh), charted.map
         pairs = np.stack([mesh.faces, held.corners], axis=2).reshape(-1, 2)
         pairs, row = np.unique(pairs, axis=0, return_inverse=True)
         normals = vertex_normals(mesh)[pairs[:, 0]]

@@ -113,6 +113,22 @@ def test_what_points_upwards_is_seen_above() -> None:
     assert (seen != room.preview(of_y, TEXTURE)).any()
 
 
+@pytest.mark.parametrize("turn", [1, -1])
+def test_of_a_sheet_with_two_sides_the_one_that_faces_the_viewer_is_seen(turn) -> None:
+    """The front shows red, the texture's top left; the back grey, its bottom right."""
+    mesh = builtin.wavy_sheet(4)
+    both = Mesh(mesh.vertices, np.concatenate([mesh.faces, mesh.faces[:, ::-1]])[::turn])
+    corners = np.repeat([[0, 0, 0], [1, 1, 1]], len(mesh.faces), axis=0)[::turn]
+    held = Parameterization(np.array([[0.1, 0.9], [0.9, 0.1]]), corners)
+    picture = room.preview(Charted(both, held), TEXTURE).astype(int)
+    above, below = picture[:, :64].reshape(-1, 3), picture[:, 64:128].reshape(-1, 3)
+    for seen, is_red in ((above, True), (below, False)):
+        drawn = seen[(seen < room.PAPER).any(axis=1)]
+        assert len(drawn) > 500
+        is_right = (drawn[:, 0] > 2 * drawn[:, 1]) == is_red
+        assert is_right.mean() > 0.95  # but where no point of the front fell into a pixel
+
+
 def test_a_preview_looks_as_it_did_when_somebody_looked(monkeypatch) -> None:
     """Mean tones of 8 by 24 parts of the picture of a torus, within three levels of 255."""
     monkeypatch.setattr(room, "SIDE", 96)
