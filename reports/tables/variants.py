@@ -17,7 +17,13 @@ from reports.contents import (
     Contents,
     number,
 )
-from reports.tables.notes import environment_note, failure_notes, legend, method_notes
+from reports.tables.notes import (
+    environment_note,
+    failure_notes,
+    grade_notes,
+    legend,
+    method_notes,
+)
 from reports.tables.table import CASE, DONE, METHOD, Column, Table, Value, short_columns
 
 
@@ -40,12 +46,17 @@ def ablation(contents: Contents) -> Table | None:
             DONE,
         ),
         blocks=tuple(_block(contents, case, names) for case in contents.cases),
-        notes=(legend(contents), *failure_notes(contents), environment_note(contents)),
+        notes=(
+            legend(contents),
+            *grade_notes(contents),
+            *failure_notes(contents),
+            environment_note(contents),
+        ),
     )
 
 
 def _block(contents: Contents, case: str, names: Sequence[str]) -> tuple[Mapping[str, Value], ...]:
-    """A row for each method on a model: the metrics `names`, and how many seeds gave a map."""
+    """A row for each method on a model: its grade, the metrics `names`, its seeds with a map."""
     rows = []
     for label in contents.methods:
         record = contents.records.get((case, label.short))
@@ -57,6 +68,7 @@ def _block(contents: Contents, case: str, names: Sequence[str]) -> tuple[Mapping
                 "case": case,
                 "method": label.short,
                 "label": label.short,
+                "grade": str(record["grade"]),
                 "done": done,
                 **{name: number(record, name) for name in names},
             }
@@ -100,7 +112,12 @@ def cuts(contents: Contents) -> Table | None:
         ),
         blocks=tuple(blocks),
         set_apart=contents.unranked.union(lengths),
-        notes=(*method_notes(contents), *failure_notes(contents), environment_note(contents)),
+        notes=(
+            *grade_notes(contents),
+            *method_notes(contents),
+            *failure_notes(contents),
+            environment_note(contents),
+        ),
     )
 
 

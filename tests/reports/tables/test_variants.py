@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from parapoint.surfaces.parameterization import Parameterization
 from reports.contents import contents
@@ -32,6 +33,33 @@ def test_an_ablation_has_variants_of_one_method(tmp_path):
     assert one["angle_difference_mean"] < two["angle_difference_mean"]
     assert [cell.mark for cell in made.cells[0][0]][2] == "best"
     assert "ParaPoint isometric: paper, 64 points, isometric" in made.notes[0]
+
+
+@pytest.mark.parametrize("table", [ablation, cuts])
+def test_a_broken_map_has_no_mark_and_a_collapsed_one_marks_of_angles_alone(tmp_path, table):
+    """The two have the lowest angles and areas of all."""
+    writer, mesh = Writer(tmp_path), sheet()
+    with writer.store.writing():
+        for number, distortion in enumerate(("broken", "collapsed", "sound", "worse")):
+            result = flat(mesh, 0.1 + 0.1 * number)
+            params, cut = {"distortion": distortion}, "automatic cut to a disk"
+            writer.cell(HAND, mesh, "parapoint", params, result=result, preprocessing=cut)
+    suite = contents(tmp_path)[0]
+    for grade in ("broken", "collapsed"):
+        suite.records[HAND, f"ParaPoint {grade}"]["grade"] = grade
+    made = table(suite)
+    keys = [column.key for column in made.columns]
+    angle, energy = keys.index("angle_difference_mean"), keys.index("symmetric_dirichlet")
+    marks = {
+        str(row["label"]).removeprefix("ParaPoint "): (cells[angle].mark, cells[energy].mark)
+        for row, cells in zip(made.blocks[0], made.cells[0], strict=True)
+    }
+    assert marks["broken"] == ("", "")
+    assert marks["collapsed"] == ("best", "")
+    assert marks["sound"] == ("second", "best")
+    assert marks["worse"] == ("", "second")
+    assert "Broken, so not ranked: ParaPoint broken on hand_1_i_f5000." in made.notes
+    assert any(note.startswith("Collapsed, so ranked by angles alone") for note in made.notes)
 
 
 def test_an_automatic_cut_is_said_and_measured(tmp_path):
