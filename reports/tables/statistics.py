@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +13,7 @@ from scipy import stats
 
 from reports.contents import ANGLE, AREA, Contents, number
 from reports.labels import Label
+from reports.ranking import is_of_angles, may_rank
 from reports.tables.notes import environment_note, failure_notes, method_notes
 from reports.tables.table import CASE, DONE, METHOD, Column, Table, Value
 
@@ -21,7 +23,7 @@ CONFIDENCE = 0.95
 
 
 class Pair(NamedTuple):
-    """Two methods on the models on which both gave a map.
+    """Two methods on the models on which both gave a map that may be ranked.
 
     Attributes:
         models: how many.
@@ -107,10 +109,11 @@ def paired_tests(contents: Contents) -> Table | None:
         name="paired",
         title="Two methods at a time",
         caption=(
-            "Every two methods on the models on which both gave a map, by means over seeds: the "
-            "median difference, how often the first is lower, and the two-sided p-value of "
-            f"Wilcoxon's signed-rank test, corrected for the {len(pairs)} pairs (Holm). Failures "
-            "do not count here; the table of successes has them."
+            "Every two methods on the models on which both gave a map that may be ranked, by means "
+            "over seeds: the median difference, how often the first is lower, and the two-sided "
+            f"p-value of Wilcoxon's signed-rank test, corrected for the {len(pairs)} pairs (Holm). "
+            "Failures and broken maps do not count here, nor collapsed ones by areas; the table of "
+            "successes has them. The number of models is that by angles."
         ),
         columns=tuple(columns),
         blocks=(tuple(rows),),
@@ -123,17 +126,23 @@ def paired_tests(contents: Contents) -> Table | None:
 
 
 def _pair(contents: Contents, one: Label, two: Label, metric: str) -> Pair:
-    """Two methods by one metric."""
+    """Two methods by one metric, on the models where the maps of both may be ranked by it."""
     found = [
         (a, b)
         for case in contents.cases
-        if (a := number(contents.records.get((case, one.short)), metric)) is not None
-        and (b := number(contents.records.get((case, two.short)), metric)) is not None
-        and math.isfinite(a)
-        and math.isfinite(b)
+        if (a := _rankable(contents.records.get((case, one.short)), metric)) is not None
+        and (b := _rankable(contents.records.get((case, two.short)), metric)) is not None
     ]
     first, second = np.array(found, dtype=np.float64).reshape(-1, 2).T
     return pair(first, second)
+
+
+def _rankable(record: Mapping[str, Any] | None, metric: str) -> float | None:
+    """The finite value of a metric in a record; None where there is none, or it has no rank."""
+    value = number(record, metric)
+    if record is None or value is None or not math.isfinite(value):
+        return None
+    return value if may_rank(record["grade"], angles=is_of_angles(metric)) else None
 
 
 def half_width(values: Floats) -> float:

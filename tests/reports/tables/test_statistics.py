@@ -6,10 +6,12 @@ import pytest
 
 from reports.contents import ANGLE, AREA, contents
 from reports.labels import Label
-from reports.tables.statistics import half_width, holm, pair, paired_tests, seed_variance
+from reports.tables.statistics import _pair, half_width, holm, pair, paired_tests, seed_variance
 from reports.tables.variants import ablation
 
 from ..conftest import seeded
+
+LABELS = [Label(name, "{}", name, "", name) for name in "xy"]
 
 
 def test_a_pair_by_hand():
@@ -74,10 +76,26 @@ def test_paired_tests_over_five_models(tmp_path):
     assert "below 0.062" in made.notes[0]
 
 
+@pytest.mark.parametrize(
+    ("grade", "angles", "areas"), [("broken", 5, 5), ("collapsed", 6, 5), ("flawed", 6, 6)]
+)
+def test_paired_tests_leave_out_maps_that_may_not_be_ranked(grade, angles, areas):
+    values = {"x": {ANGLE: 0.1, AREA: 0.1}, "y": {ANGLE: 0.2, AREA: 0.2}}
+    records = {
+        (case, name): {**values[name], "grade": "usable"} for case in "abcdef" for name in "xy"
+    }
+    records["a", "x"]["grade"] = grade
+    found = [
+        _pair(SimpleNamespace(cases=list("abcdef"), records=records), *LABELS, metric)
+        for metric in (ANGLE, AREA)
+    ]
+    assert [(test.models, test.wins) for test in found] == [(angles, angles), (areas, areas)]
+
+
 def test_four_models_are_too_few_for_paired_tests():
-    records = {(case, name): {ANGLE: 0.1, AREA: 0.1} for case in "abcd" for name in "xy"}
-    methods = [Label(name, "{}", name, "", name) for name in "xy"]
+    values = {ANGLE: 0.1, AREA: 0.1, "grade": "usable"}
+    records = {(case, name): values for case in "abcd" for name in "xy"}
     suite = SimpleNamespace(
-        cases=list("abcd"), methods=methods, records=records, unranked=frozenset()
+        cases=list("abcd"), methods=LABELS, records=records, unranked=frozenset()
     )
     assert paired_tests(suite) is None
