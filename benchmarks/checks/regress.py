@@ -82,7 +82,7 @@ SOLVERS = Comparison(
         if metric.group not in ("points", "reference") and not name.endswith(WITHOUT_SPANNING)
     ),
 )
-"""Every baseline that gives the same map each time and installs with the benchmark.
+"""Some of the baselines that give the same map each time and install with the benchmark.
 
 Metrics without spanning faces are left out: most of these maps are one to one and have none.
 """
@@ -328,7 +328,7 @@ def table(found: Sequence[Move]) -> Table:
 @click.option("--update", is_flag=True, help="Rewrite the golden values with those found now.")
 @click.pass_context
 def main(ctx: click.Context, /, *, update: bool) -> None:
-    """Compare the metric values of every deterministic method with the golden ones."""
+    """Compare the metric values of some deterministic methods with the golden ones."""
     from benchmarks.commands.tables import print_table
 
     allowed = {comparison.name: tolerances(comparison) for comparison in COMPARISONS}

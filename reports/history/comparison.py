@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from benchmarks.checks import regress
+from benchmarks.checks.promises import repeats
 from benchmarks.metrics.table import METRICS
 from benchmarks.store.rows import ResultRow
 from reports.contents import Contents, contents
@@ -26,14 +26,11 @@ Floats = npt.NDArray[np.float64]
 WATCHED = tuple(name for name in SUMMARY_METRICS if name not in TIMES)
 """The metrics that are compared, over all faces and without those that span a seam."""
 
-DETERMINISTIC = frozenset(spec.partition("(")[0] for spec in regress.SOLVERS.methods)
-"""Methods that are held to give one map each time; cells with several seeds may tell of others."""
-
 ROUNDING = 1e-6
-"""Relative change of such a method that other hardware may make."""
+"""Relative change that other hardware may make where chance has no part."""
 
 ONE_SEED = 0.05
-"""Relative change taken for noise where a seeded method has one seed: nothing is known of it."""
+"""Relative change taken for noise where chance has a part and a cell has one seed."""
 
 ONE_TIME, LEAST_SECONDS = 0.25, 0.1
 """Change of a single time taken for noise: relative, and in seconds."""
@@ -58,6 +55,11 @@ class Group:
     short: str
     rows: Mapping[int, ResultRow]
     values: Mapping[str, Floats]
+
+    @property
+    def seeds(self) -> set[int]:
+        """The seeds that gave a map."""
+        return {seed for seed, row in self.rows.items() if row.status == "ok"}
 
     @property
     def maps(self) -> set[str]:
@@ -196,9 +198,23 @@ class Comparison:
                     told[method, params] = told.get((method, params), True) and same
         return told
 
+    @cached_property
+    def _promised(self) -> dict[tuple[str, str], bool]:
+        """Whether each method of the shared cells promises one map for one seed."""
+        found = {key[2:] for key in self.shared}
+        return {(method, params): repeats(method, json.loads(params)) for method, params in found}
+
     def is_deterministic(self, key: Key) -> bool:
-        """Whether the method gives one map each time, whatever the seed."""
-        return self._repeats.get((key[2], key[3]), key[2] in DETERMINISTIC)
+        """Whether chance has no part in a change of a shared cell.
+
+        Where a method has several seeds somewhere, their maps tell. Else its promise does, for the
+        same seeds before and after.
+        """
+        told = self._repeats.get(key[2:])
+        if told is not None:
+            return told
+        before, after = self.group(key)
+        return before.seeds == after.seeds and self._promised[key[2:]]
 
     @cached_property
     def moves(self) -> list[Move]:

@@ -53,7 +53,7 @@ def test_the_same_maps_do_not_move(tmp_path):
 
 def test_a_deterministic_method_may_not_move_at_all_a_seeded_one_within_its_noise(tmp_path):
     before = [
-        (HAND, "slim", [0.3], {}),  # deterministic as the project holds it
+        (HAND, "slim", [0.3], {}),  # deterministic, as it promises
         (HAND, "mine", [0.3, 0.3], {}),  # deterministic, as its seeds tell
         (DEVIL, "mine", [0.3], {}),
         (HAND, "parapoint", [0.30], {}),
@@ -81,6 +81,24 @@ def test_a_deterministic_method_may_not_move_at_all_a_seeded_one_within_its_nois
     assert len(found.changed_maps()) == 3
     row = {row["method"]: row for row in summary(found).blocks[0]}["SLIM"]
     assert (row["cells"], row["maps"], row["worse"], row["better"]) == (1, 0, 1, 0)
+
+
+def test_a_promise_of_one_map_for_one_seed_holds_for_every_method_of_the_registry(tmp_path):
+    names = ("mean_value", "automatic+slim", "uvatlas")
+    found = compared(
+        tmp_path,
+        [(HAND, name, [0.3], {}) for name in names],
+        [(HAND, name, [0.3001], {}) for name in names],
+    )
+    assert set(values(found, ANGLE)) == {(HAND, "mean_value"), (HAND, "automatic+slim")}
+
+
+def test_a_promise_of_one_map_for_one_seed_says_nothing_of_another_seed(tmp_path):
+    found = compared(
+        tmp_path, [(HAND, "mean_value", [0.3], {})], [(HAND, "mean_value", [None, 0.3001], {})]
+    )
+    del found.cells[1][found.shared[0]].rows[0]
+    assert found.moves == []
 
 
 def test_the_noise_of_several_seeds_is_welch_s_interval(tmp_path):
