@@ -34,6 +34,19 @@ SAME_METHOD: dict[str, tuple[str, dict[str, object]]] = {
 }
 """The method here, and the parameters it must have, that a published figure speaks of."""
 
+FREE: dict[str, frozenset[str]] = {
+    "parapoint": frozenset(
+        {
+            *("preset", "points", "iterations", "subset", "time_budget"),
+            *("components", "seed", "device", "threads"),
+        }
+    ),
+}
+"""The parameters that make no variant of a method with presets: how much it may take, and where.
+
+Any other one is None, which takes the preset's value, or departs from what was published.
+"""
+
 CUT_BY_HAND = "cut by hand"
 """The note of a figure whose model somebody cut by hand. It is compared with maps of the model cut
 along a seam that was drawn here, and with no other."""
@@ -148,9 +161,11 @@ def verdicts(contents: Contents) -> list[Verdict]:
 
 
 def _speaks_of(figure: PublishedFigure, label: Label) -> bool:
-    """Whether a figure was published for a method, with these parameters."""
+    """Whether a figure was published for a method, with these parameters: not for a variant."""
     method, needed = SAME_METHOD.get(figure.method, ("", {}))
-    return label.method == method and needed.items() <= label.parameters.items()
+    given = {name: value for name, value in label.parameters.items() if value is not None}
+    is_variant = not given.keys() <= FREE.get(method, given.keys())
+    return label.method == method and needed.items() <= given.items() and not is_variant
 
 
 def _verdicts(

@@ -1,4 +1,6 @@
 import dataclasses
+import json
+from types import SimpleNamespace
 
 import pytest
 
@@ -77,6 +79,32 @@ def test_a_cut_by_hand_is_not_compared_with_an_automatic_one(results):
     verdict = next(v for v in verdicts(contents(results)[0]) if v.case == NEFERTITI)
     verdict = dataclasses.replace(verdict, measured=0.089, grade="usable")
     assert verdict.text == "not comparable: published: cut by hand"
+
+
+@pytest.mark.parametrize(
+    ("changed", "is_judged"),
+    [
+        ({}, True),
+        ({"time_budget": 150.0, "points": 64, "subset": 64, "iterations": 9}, True),
+        ({"seed": 0, "threads": 1, "device": "cpu", "components": "together"}, True),
+        ({"distortion": None, "unwrap_weight": None}, True),
+        ({"distortion": "isometric"}, False),
+        ({"branches": "2d"}, False),
+        ({"start": "computed"}, False),
+        ({"optimizer": "soap"}, False),
+        ({"eigenvalues": "gram"}, False),
+        ({"distortion_weight": 1e-4}, False),
+        ({"unwrap_weight": 0.0}, False),
+        ({"cycle_weight": 0.0}, False),
+        ({"anti_flip_weight": 0.0}, False),
+    ],
+)
+def test_a_variant_of_the_published_method_has_no_verdict(changed, is_judged):
+    params = json.dumps({"preset": "paper"} | changed)
+    label = Label("parapoint", params, "ParaPoint", "", "ParaPoint")
+    suite = SimpleNamespace(cases=[HAND], methods=[label], records={})
+    judged = [v.figure.method for v in verdicts(suite) if v.label is not None]
+    assert judged == (["ParaPoint"] if is_judged else [])
 
 
 def test_a_broken_map_is_compared_with_no_figure(results):
