@@ -79,8 +79,9 @@ class Validity:
 
 
 def flipped_fraction(validity: Validity) -> float:
-    """Fraction of the faces, by number, that are flipped within their chart."""
-    return float(validity.flipped.mean())
+    """Fraction of the faces, by number, that are flipped within their chart; 0 without any face."""
+    flipped = validity.flipped
+    return float(flipped.mean()) if len(flipped) else 0.0
 
 
 def flipped_fraction_global(validity: Validity) -> float:

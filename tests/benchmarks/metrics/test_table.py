@@ -296,6 +296,16 @@ def test_a_map_of_other_faces_is_refused():
         evaluate(mesh, parameterization, short)
 
 
+@pytest.mark.parametrize(
+    "name", [name for name in METRICS if METRICS[name].group not in ("points", "reference")]
+)
+def test_no_metric_is_nan_where_every_face_spans_a_seam(name):
+    mesh, parameterization = two_charts(0)
+    spanned = state.MapState(mesh, parameterization)
+    vars(spanned)["spanning"] = np.ones(len(mesh.faces), dtype=bool)
+    assert not np.isnan(METRICS[name].function(spanned))
+
+
 def planar_map(factors):
     """A strip of unit squares, the images stretched by a factor a square, one chart each."""
     uv, corners, points, faces = [], [], [], []
