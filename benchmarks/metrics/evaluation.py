@@ -18,10 +18,12 @@ def evaluate(
     Args:
         mesh: the surface, as it was before any cut: seams are where the map leaves its edges.
         parameterization: the map, its faces in the order of the mesh.
-        reference: another map of the same faces; without it the group "reference" is left out.
+        reference: another map of the same faces, which covers all that the map covers; without it
+            the group "reference" is left out.
 
     Raises:
-        InputError: a map has another number of faces than the mesh.
+        InputError: a map has another number of faces than the mesh, or the reference leaves out
+            faces that the map covers.
     """
     return values(MapState(mesh, parameterization, reference))
 

@@ -22,12 +22,13 @@ class MapState:
     Attributes:
         mesh: the surface.
         parameterization: the map.
-        reference: another map of the same faces, or None.
+        reference: another map of the same faces, or None; it covers all that the map covers.
         coverage: share of the surface, from 0 to 1, that the map covers.
         welded: number of vertices that lie where another one does.
 
     Raises:
-        InputError: a map has another number of faces than the mesh.
+        InputError: a map has another number of faces than the mesh, or the reference leaves out
+            faces that the map covers.
     """
 
     mesh: Mesh
@@ -42,6 +43,13 @@ class MapState:
                 raise InputError(
                     f"the {name} has {len(of.corners)} faces, the mesh {len(self.mesh.faces)}; "
                     "both must have the same faces in the same order"
+                )
+        if self.reference is not None:
+            left_out = int((self.parameterization.covered & ~self.reference.covered).sum())
+            if left_out:
+                raise InputError(
+                    f"the reference leaves out {left_out} of the faces that the map covers; "
+                    "it must cover them all"
                 )
         found = scored(self.mesh, self.parameterization, self.reference)
         for name, value in found._asdict().items():

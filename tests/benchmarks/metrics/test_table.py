@@ -296,6 +296,22 @@ def test_a_map_of_other_faces_is_refused():
         evaluate(mesh, parameterization, short)
 
 
+def without_face(parameterization, face):
+    """The map with a row of uv for each corner, and none for one face."""
+    uv = parameterization.uv[parameterization.corners]
+    uv[face] = np.nan
+    return Parameterization(uv.reshape(-1, 2), np.arange(3 * len(uv)).reshape(-1, 3))
+
+
+def test_a_reference_that_leaves_faces_out_is_refused():
+    mesh, parameterization = two_charts(0)
+    partial = without_face(parameterization, 5)
+    with pytest.raises(InputError, match="the reference leaves out 1 of the faces that the map"):
+        evaluate(mesh, parameterization, partial)
+    # What the map leaves out, the reference may leave out, too.
+    assert evaluate(mesh, partial, partial)["artist_correlation"] == pytest.approx(0, abs=1e-12)
+
+
 @pytest.mark.parametrize(
     "name", [name for name in METRICS if METRICS[name].group not in ("points", "reference")]
 )
