@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.cases.suites import SUITES
-from benchmarks.metrics.grades import grade_of
+from benchmarks.metrics.grades import WHOLE, grade_of
 from benchmarks.metrics.table import METRICS
 from benchmarks.store import measuring
 from benchmarks.store.results import Store
@@ -31,8 +31,6 @@ ANGLE, AREA = "angle_difference_mean", "area_discrepancy_total"
 FLIPPED, SPANNING = "flipped_fraction", "spanning_fraction"
 FLIPPED_OFF_SEAM = f"{FLIPPED}_without_spanning"
 WORST_PART = "part_area_ratio_min_without_spanning"
-WHOLE = 0.95
-"""Share of a surface that a map must cover to be ranked among maps of the whole."""
 SHEETS = 12
 """Most models of a report in which each has figures of its own, and all pictures for them."""
 ISOMETRIC = "symmetric_dirichlet"

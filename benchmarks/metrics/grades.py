@@ -24,6 +24,9 @@ FLIPPED = 0.005
 OVERLAPPED = 0.01
 """Fraction of the surface that a usable map of a cloud may overlap. For a cloud without faces, the
 fraction of the points that may collide."""
+WHOLE = 0.95
+"""Fraction of the surface, or of the points of a cloud without faces, that a usable map covers at
+least. A method whose maps cover less on most surfaces is not ranked among those of the whole."""
 
 FROM_POINTS = frozenset(
     {
@@ -37,7 +40,8 @@ BOUNDS = (
     f"broken: more than {BROKEN:.0%} of the surface flipped or overlapped, or not finite; "
     f"collapsed: a part of at least {LEAST_PART:.0%} of the surface has less than a quarter of its "
     f"fair area; usable: no flips and overlaps (of a cloud at most {FLIPPED:.1%} and "
-    f"{OVERLAPPED:.0%}), nothing collapsed, at most {MOST_STARVED:.0%} starved; flawed: the rest"
+    f"{OVERLAPPED:.0%}), nothing collapsed, at most {MOST_STARVED:.0%} starved, at least "
+    f"{WHOLE:.0%} of the surface mapped; flawed: the rest"
 )
 """What the grades mean, in one line for the notes of a table."""
 
@@ -55,7 +59,7 @@ def grade(values: Mapping[str, float], *, of_cloud: bool) -> Grade:
     """
     if "local_quasi_conformal_mean" in values:
         return _grade_of_points(values)
-    flipped, overlapped, degenerate, smallest, starved = (
+    flipped, overlapped, degenerate, smallest, starved, coverage = (
         values[name]
         for name in (
             "flipped_area_fraction_without_spanning",
@@ -63,6 +67,7 @@ def grade(values: Mapping[str, float], *, of_cloud: bool) -> Grade:
             "degenerate_uv_count",
             "part_area_ratio_min_without_spanning",
             "starved_area_fraction_without_spanning",
+            "coverage",
         )
     )
     finite = math.isfinite(values["symmetric_dirichlet_without_spanning"])
@@ -76,7 +81,8 @@ def grade(values: Mapping[str, float], *, of_cloud: bool) -> Grade:
         if of_cloud
         else faces == 0 and overlapped == 0 and degenerate == 0
     )
-    return "usable" if is_sound and starved <= MOST_STARVED else "flawed"
+    is_enough = starved <= MOST_STARVED and coverage >= WHOLE
+    return "usable" if is_sound and is_enough else "flawed"
 
 
 def grade_of(method: str, values: Mapping[str, object]) -> Grade | None:
@@ -104,5 +110,5 @@ def _grade_of_points(values: Mapping[str, float]) -> Grade:
         return "broken"
     if values["point_part_area_ratio_min"] < 1:
         return "collapsed"
-    is_sound = collided <= OVERLAPPED and values["starved_point_fraction"] <= MOST_STARVED
-    return "usable" if is_sound else "flawed"
+    is_enough = values["starved_point_fraction"] <= MOST_STARVED and values["coverage"] >= WHOLE
+    return "usable" if collided <= OVERLAPPED and is_enough else "flawed"

@@ -102,6 +102,7 @@ def test_a_few_flips_are_forgiven_to_maps_of_points_alone():
         "overlap_area_without_spanning": 0.0,
         "degenerate_uv_count": 0.0,
         "part_area_ratio_min_without_spanning": 1.0,
+        "coverage": 1.0,
         "starved_area_fraction_without_spanning": 0.0,
         "symmetric_dirichlet_without_spanning": 4.2,
     }

@@ -114,6 +114,7 @@ def test_the_summary_counts_grades_and_names_the_worst_part(capsys):
         "overlap_area_without_spanning": 0.0,
         "degenerate_uv_count": 0.0,
         "part_area_ratio_min_without_spanning": 1.0,
+        "coverage": 1.0,
         "starved_area_fraction_without_spanning": 0.0,
         "symmetric_dirichlet_without_spanning": 4.1,
         "flipped_fraction_without_spanning": 0.0,

@@ -10,12 +10,14 @@ PERFECT = {
     "part_area_ratio_min_without_spanning": 1.0,
     "starved_area_fraction_without_spanning": 0.0,
     "symmetric_dirichlet_without_spanning": 4.0,
+    "coverage": 1.0,
 }
 POINTS = {
     "local_quasi_conformal_mean": 1.0,
     "uv_collision_fraction": 0.0,
     "point_part_area_ratio_min": 1.0,
     "starved_point_fraction": 0.0,
+    "coverage": 1.0,
 }
 ALIAS = {
     "flipped_area": "flipped_area_fraction_without_spanning",
@@ -25,6 +27,7 @@ ALIAS = {
     "part": "part_area_ratio_min_without_spanning",
     "starved": "starved_area_fraction_without_spanning",
     "energy": "symmetric_dirichlet_without_spanning",
+    "coverage": "coverage",
 }
 
 
@@ -48,6 +51,9 @@ ALIAS = {
         ({"degenerate": 1.0}, "flawed", "usable"),
         ({"starved": 0.02}, "usable", "usable"),
         ({"starved": 0.0201}, "flawed", "flawed"),
+        ({"coverage": 0.95}, "usable", "usable"),
+        ({"coverage": 0.9499}, "flawed", "flawed"),
+        ({"coverage": 0.1, "part": 0.1}, "collapsed", "collapsed"),
     ],
 )
 def test_each_bound_parts_two_grades(changed, of_mesh, of_cloud):
@@ -66,6 +72,8 @@ def test_each_bound_parts_two_grades(changed, of_mesh, of_cloud):
         ({"uv_collision_fraction": 0.01}, "usable"),
         ({"point_part_area_ratio_min": 0.2}, "collapsed"),
         ({"starved_point_fraction": 0.03}, "flawed"),
+        ({"coverage": 0.95}, "usable"),  # some stray points have no uv
+        ({"coverage": 0.9499}, "flawed"),
     ],
 )
 def test_a_cloud_without_faces_has_grades_too(changed, expected):
