@@ -3,6 +3,9 @@
 Faces that span a seam do not count. A **broken** map is shown, and never ranked. A **collapsed**
 one is ranked by its angles alone. A **usable** one is fit for use, and counts as a success. Any
 other map is **flawed**: it is ranked, and does not count as a success.
+
+A face without an area in the plane is left out of the mean distortion. So this is infinite, and the
+map broken, only where no face has such an area.
 """
 
 from __future__ import annotations
@@ -37,13 +40,17 @@ FROM_POINTS = frozenset(
 """Methods whose maps are made of points alone, so that a few flips at a face are forgiven."""
 
 BOUNDS = (
-    f"broken: more than {BROKEN:.0%} of the surface flipped or overlapped, or not finite; "
-    f"collapsed: a part of at least {LEAST_PART:.0%} of the surface has less than a quarter of its "
-    f"fair area; usable: no flips and overlaps (of a cloud at most {FLIPPED:.1%} and "
-    f"{OVERLAPPED:.0%}), nothing collapsed, at most {MOST_STARVED:.0%} starved, at least "
+    f"broken: more than {BROKEN:.0%} of the surface flipped or overlapped, or no face with an area "
+    f"in the map; collapsed: a part of at least {LEAST_PART:.0%} of the surface has less than a "
+    f"quarter of its fair area; usable: no flips and overlaps (of a cloud at most {FLIPPED:.1%} "
+    f"and {OVERLAPPED:.0%}), nothing collapsed, at most {MOST_STARVED:.0%} starved, at least "
     f"{WHOLE:.0%} of the surface mapped; flawed: the rest"
 )
-"""What the grades mean, in one line for the notes of a table."""
+"""What the grades mean, in one line for the notes of a table.
+
+For a cloud without faces, points that collide take the place of overlaps, and nothing that of
+flips; parts and starving are those of points.
+"""
 
 
 def grade(values: Mapping[str, float], *, of_cloud: bool) -> Grade:
@@ -104,7 +111,10 @@ def grade_of(method: str, values: Mapping[str, object]) -> Grade | None:
 
 
 def _grade_of_points(values: Mapping[str, float]) -> Grade:
-    """The grade of a map of a cloud without faces; collisions of points count as overlaps."""
+    """The grade of a map of a cloud without faces; collisions of points count as overlaps.
+
+    It is broken, too, where at no point the map has two directions.
+    """
     collided = values["uv_collision_fraction"]
     if not (math.isfinite(values["local_quasi_conformal_mean"]) and collided <= BROKEN):
         return "broken"

@@ -1,6 +1,10 @@
+import igl
+import numpy as np
 import pytest
 
+from benchmarks.metrics.evaluation import evaluate
 from benchmarks.metrics.grades import grade
+from parapoint import Mesh, Parameterization
 
 PERFECT = {
     "flipped_area_fraction_without_spanning": 0.0,
@@ -78,6 +82,19 @@ def test_each_bound_parts_two_grades(changed, of_mesh, of_cloud):
 )
 def test_a_cloud_without_faces_has_grades_too(changed, expected):
     assert grade(POINTS | changed, of_cloud=True) == expected
+
+
+def test_a_map_is_broken_where_no_face_has_an_area_in_it():
+    """One face of 392 that is folded to a line is a flaw."""
+    uv, faces = igl.triangulated_grid(15, 15)
+    mesh = Mesh(np.column_stack([uv, np.zeros(len(uv))]), faces)
+    folded = uv[faces]
+    folded[0, 2] = folded[0, :2].mean(axis=0)
+    corners = np.arange(3 * len(faces)).reshape(-1, 3)
+    values = evaluate(mesh, Parameterization(folded.reshape(-1, 2), corners))
+    assert grade(values, of_cloud=False) == "flawed"
+    values = evaluate(mesh, Parameterization(np.zeros_like(uv), faces))
+    assert grade(values, of_cloud=False) == "broken"
 
 
 def test_a_missing_metric_is_an_error():
