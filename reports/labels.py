@@ -68,7 +68,6 @@ TOLD = (
     "flattening",
     "preset",
     "energy",
-    "loss",
     "iterations",
     "points",
     "time_budget",
@@ -130,10 +129,27 @@ def _words(name: str, value: object) -> str:
     if value is None or value == "":
         return ""
     if isinstance(value, int | float) and not isinstance(value, bool):
-        unit = {"time_budget": "s budget"}.get(name, name.replace("_", " "))
-        return f"{value:,} {unit.removesuffix('s') if value == 1 else unit}"
+        return _amount(name, value)
     told = BRANCHES.get(str(value)) if name == "branches" else None
     return told or str(value).replace("_", " ").replace("dirichlet", "Dirichlet")
+
+
+def _amount(name: str, *values: float) -> str:
+    """A number, or the range of some, with what it is a number of.
+
+    A parameter whose name ends in "s" counts things: "20 iterations". Other numbers come after
+    their name: "price 1"; but for times: "150.0 s budget".
+    """
+    is_time, is_count, words = name == "time_budget", name.endswith("s"), name.replace("_", " ")
+    ends = dict.fromkeys((min(values), max(values)))
+    text = " to ".join(
+        f"{end:,}" if is_time or isinstance(end, int) else f"{end:g}" for end in ends
+    )
+    if is_time:
+        return f"{text} s budget"
+    if is_count:
+        return f"{text} {words.removesuffix('s') if max(values) == 1 else words}"
+    return f"{words} {text}"
 
 
 def _told(rows: Sequence[ResultRow], name: str) -> str:
@@ -145,7 +161,7 @@ def _told(rows: Sequence[ResultRow], name: str) -> str:
         if value is not None and value not in values:
             values.append(value)
     if len(values) > 1 and all(isinstance(value, int | float) for value in values):
-        return f"{min(values):,} to {_words(name, max(values))}"
+        return _amount(name, *values)
     return " / ".join(_words(name, value) for value in values)
 
 

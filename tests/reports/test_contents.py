@@ -8,7 +8,7 @@ from parapoint.errors import InputError
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.surface import Mesh
 from reports.contents import contents, suite_title
-from reports.labels import labels
+from reports.labels import _told, labels
 from reports.tables.notes import version_notes
 
 from .conftest import HAND, Writer, flat, sheet
@@ -42,13 +42,13 @@ def test_labels_name_energy_iterations_and_only_what_differs(tmp_path):
         "SLIM symmetric Dirichlet 1 iteration",
         "SLIM conformal",
         "mine",
-        "ParaPoint 0.1 lr",
-        "ParaPoint 0.2 lr",
+        "ParaPoint lr 0.1",
+        "ParaPoint lr 0.2",
     ]
     assert [label.text for label in found.values()][1] == (
         "SLIM (symmetric Dirichlet, 20 iterations)"
     )
-    assert [label.text for label in found.values()][-1] == "ParaPoint (paper, 0.2 lr)"
+    assert [label.text for label in found.values()][-1] == "ParaPoint (paper, lr 0.2)"
 
 
 def test_variants_are_told_by_their_change_and_the_default_by_its_report(tmp_path):
@@ -168,6 +168,25 @@ def test_missing_and_empty_folders_are_said_in_one_line(tmp_path):
         contents(tmp_path / "nowhere")
     with pytest.raises(InputError, match="holds no results"):
         contents(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "text"),
+    [
+        ("iterations", [20], "20 iterations"),
+        ("iterations", [1], "1 iteration"),
+        ("points", [2517, 10_000], "2,517 to 10,000 points"),
+        ("time_budget", [150.0], "150.0 s budget"),
+        ("unwrap_weight", [0.0], "unwrap weight 0"),
+        ("distortion_weight", [1e-4], "distortion weight 0.0001"),
+        ("price", [0.5, 1.0], "price 0.5 to 1"),
+        ("subset", [1024], "subset 1,024"),
+    ],
+)
+def test_a_number_in_a_label_says_what_it_is_of(tmp_path, name, values, text):
+    cells = [("parapoint", {"preset": "paper"} | {name: value}, {}) for value in values]
+    made = rows(tmp_path, *cells)
+    assert _told(made, name) == text
 
 
 def test_titles_of_suites():
