@@ -93,7 +93,10 @@ class Contents:
         return [row for row in self.rows if row.case == case and self.labels[row.id] == label]
 
     def shown(self, case: str, label: Label) -> ResultRow | None:
-        """The row whose map stands for a model and a method in figures: the first seed's, if ok."""
+        """The row whose map stands for a model and a method in figures.
+
+        It is that of the smallest seed that gave a map; None where no seed did.
+        """
         good = [row for row in self.cell(case, label) if row.status == "ok"]
         return min(good, key=lambda row: row.seed) if good else None
 

@@ -72,7 +72,7 @@ SUMMARY_METRICS = (
     POINT_TEARS,
     *TIMES,
 )
-"""The metrics of the printed comparison; its CSV has them all."""
+"""The metrics of the comparison, in print and as CSV; `everything` has all, cell by cell."""
 
 
 def conformality(contents: Contents) -> Table | None:
