@@ -91,7 +91,7 @@ def docs(session: nox.Session) -> None:
 
 @nox.session
 def regress(session: nox.Session) -> None:
-    """Compare the metric values of every deterministic method with the golden ones."""
+    """Compare the metric values of the methods that are watched with the golden ones."""
     install(session)
     session.run("python", "-m", "benchmarks.checks.regress", *session.posargs)
 
