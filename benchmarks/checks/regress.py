@@ -11,8 +11,8 @@ few models.
     tests/golden/figures.csv               single known values, with tolerance and reason
 
 Cells are kept in results/regress. A cell runs again where the source of its method, its surface or
-the environment has changed, and is measured again where the source of a metric has. A change that
-is meant to move values rewrites them with --update, and its commit says by how much they moved.
+the version of a library that the method names has changed, and is measured again where the source
+of a metric has. A change that is meant to move values rewrites them with --update, and its commit says by how much they moved.
 """
 
 from __future__ import annotations

@@ -17,19 +17,17 @@ from benchmarks.metrics.grades import BOUNDS, grade
 from benchmarks.metrics.metric import GROUPS, WITHOUT_SPANNING
 from benchmarks.metrics.state import MapState
 from benchmarks.metrics.table import METRICS
+from benchmarks.store.submissions import difference
 from parapoint.commands.memory import memory_option
 from parapoint.console import terminal
 from parapoint.errors import InputError
 from parapoint.files.reading import faults_of, has_faces, read_parameterized, read_point_map
 from parapoint.files.targets import checked_picture
 from parapoint.surfaces.parameterization import Parameterization
-from parapoint.surfaces.surface import FloatArray, IntArray, Mesh
+from parapoint.surfaces.surface import FloatArray, IntArray
 
 WORST = 5
 """Number of faces that are listed as the worst by angle, and as the worst by area."""
-SAME_PLACE = 1e-5
-"""How far a corner of the reference may lie from the surface's, as a fraction of the surface's
-largest extent. Shay et al. allow as much."""
 WIDTH = 160
 """Width of the tables in characters if the output is not a terminal."""
 
@@ -98,21 +96,12 @@ def map_state(file: Path, reference: Path | None = None) -> MapState:
     if reference is None:
         return state
     other_mesh, other = read_parameterized(reference)
-    if not same_faces(mesh, other_mesh):
+    if difference(mesh, other_mesh):
         raise InputError(
             f"{reference}: has other faces than {file} ({len(other_mesh.faces)} and "
             f"{len(mesh.faces)}); a reference is another map of the same mesh, in the same order"
         )
     return MapState(mesh, parameterization, Parameterization(other.uv, other.corners))
-
-
-def same_faces(mesh: Mesh, other: Mesh) -> bool:
-    """Whether two meshes have the same triangles in the same order, up to rounding."""
-    if len(mesh.faces) != len(other.faces):
-        return False
-    here, there = mesh.vertices[mesh.faces], other.vertices[other.faces]
-    extent = float(np.ptp(here.reshape(-1, 3), axis=0).max())
-    return bool((np.abs(here - there) <= SAME_PLACE * extent).all())
 
 
 def json_values(values: dict[str, float]) -> dict[str, float | str]:

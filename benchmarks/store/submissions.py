@@ -32,7 +32,7 @@ LONGEST_NAME = 80
 """Characters that the name of a submitted method may have."""
 SAME_PLACE = 1e-5
 """How far a corner may lie from the model's, as a fraction of the model's largest extent: tools
-print six digits."""
+print six digits, and Shay et al. allow as much."""
 NO_MAP = "no map was submitted"
 """Reason of the row of a case that a submission lacks."""
 

@@ -14,7 +14,6 @@ from benchmarks.commands.score import (
     json_values,
     map_state,
     number,
-    same_faces,
     worst_faces,
     worst_table,
 )
@@ -23,6 +22,7 @@ from benchmarks.metrics.evaluation import evaluate
 from benchmarks.metrics.grades import GRADES
 from benchmarks.metrics.state import MapState
 from benchmarks.metrics.table import METRICS
+from benchmarks.store.submissions import difference
 from parapoint import Mesh, PointCloud, console
 from parapoint.files.reading import read_parameterized
 from parapoint.files.writing.point_writers import write_points
@@ -208,8 +208,8 @@ def test_bad_references_get_one_line(obj, tmp_path, capsys, content, words):
 
 def test_a_rounded_reference_is_the_same_mesh(obj):
     mesh, _ = read_parameterized(obj)
-    assert same_faces(mesh, Mesh(mesh.vertices + 1e-6, mesh.faces))
-    assert not same_faces(mesh, Mesh(mesh.vertices + 1e-3, mesh.faces))
+    assert not difference(mesh, Mesh(mesh.vertices + 1e-6, mesh.faces))
+    assert difference(mesh, Mesh(mesh.vertices + 1e-3, mesh.faces))
 
 
 @pytest.mark.parametrize(
