@@ -12,7 +12,8 @@ few models.
 
 Cells are kept in results/regress. A cell runs again where the source of its method, its surface or
 the version of a library that the method names has changed, and is measured again where the source
-of a metric has. A change that is meant to move values rewrites them with --update, and its commit says by how much they moved.
+of a metric has. A change that is meant to move values rewrites them with --update, and its commit
+says by how much they moved.
 """
 
 from __future__ import annotations
