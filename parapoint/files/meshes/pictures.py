@@ -7,15 +7,21 @@ import re
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from parapoint.errors import InputError
 
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
 MOST_TEXELS = 16_384
 """Texels along a side of a picture that is read."""
 WHITE = (255, 255, 255)
+ONLY_16_BITS = {("I", "PNG"), ("I", "PPM")}
+"""Modes of Pillow and formats that together mean numbers from 0 to 65535."""
 
 Picture = npt.NDArray[np.uint8]
 
@@ -33,23 +39,58 @@ class Material:
     picture: Picture | None = None
 
 
-def read_picture(data: bytes | Path) -> Picture:
+def read_picture(data: bytes | Path, name: str = "") -> Picture:
     """(H, W, 3 or 4) the pixels of an image file of any kind that Pillow reads.
 
-    Raises:
-        InputError: it is none, or is larger than MOST_TEXELS.
-    """
-    from PIL import Image
+    Grey of 16 bits becomes grey of 8.
 
-    name = f"{data}: " if isinstance(data, Path) else ""
+    Args:
+        data: the file, or its bytes.
+        name: what messages call it; a file is called by its path.
+
+    Raises:
+        InputError: it is none, is larger than MOST_TEXELS, or holds numbers of no known range.
+    """
+    from PIL import Image as Images
+    from PIL import UnidentifiedImageError
+
     try:
-        with Image.open(data if isinstance(data, Path) else io.BytesIO(data)) as image:
-            if max(image.size) > MOST_TEXELS:
-                raise InputError(f"{name}a picture of {image.size} texels is too large to bake")
-            has_alpha = "A" in image.getbands() or "transparency" in image.info
-            return np.asarray(image.convert("RGBA" if has_alpha else "RGB"))
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        raise InputError(f"{name}is no picture that can be read ({error})") from None
+        with Images.open(data if isinstance(data, Path) else io.BytesIO(data)) as image:
+            return _pixels(image)
+    except InputError as error:
+        fault = str(error)
+    except UnidentifiedImageError:
+        fault = "is no picture of a kind that is read; save it as PNG or JPEG"
+    except (OSError, ValueError, SyntaxError) as error:
+        fault = f"is no picture that can be read ({error})"
+    name = str(data) if isinstance(data, Path) else name
+    raise InputError(f"{name}: {fault}" if name else fault)
+
+
+def _pixels(image: Image) -> Picture:
+    """(H, W, 3 or 4) the pixels of an image that is open.
+
+    Raises:
+        InputError: it is larger than MOST_TEXELS, or its numbers have no known range.
+    """
+    if max(image.size) > MOST_TEXELS:
+        width, height = image.size
+        raise InputError(
+            f"is a picture of {width:,} by {height:,} texels; at most {MOST_TEXELS:,} along a side "
+            "are read: make it smaller"
+        )
+    if not image.mode.startswith(("I", "F")):
+        has_alpha = "A" in image.getbands() or "transparency" in image.info
+        return np.asarray(image.convert("RGBA" if has_alpha else "RGB"))
+    # Pillow clips numbers of more than 8 bits. It opens those of 16 as "I;16" in some byte order,
+    # or as "I" where the format has no wider ones.
+    if not image.mode.startswith("I;16") and (image.mode, image.format) not in ONLY_16_BITS:
+        raise InputError("is a picture of numbers of no known range; save it with 8 or 16 bits")
+    values = np.asarray(image).astype(np.int64)
+    shown = np.repeat(values[..., None] * 255 / 65535, 3, axis=2)
+    if (hidden := image.info.get("transparency")) is not None:
+        shown = np.dstack([shown, np.where(values == hidden, 0, 255)])
+    return np.rint(shown).astype(np.uint8)
 
 
 def named_file(folder: Path, written: str) -> Path | None:
