@@ -7,9 +7,9 @@ import numpy.typing as npt
 
 from parapoint.files.attributes import srgb, unit_colours
 from parapoint.files.meshes.painting import Painting
-from parapoint.files.meshes.pictures import WHITE, Picture
+from parapoint.files.meshes.pictures import WHITE, Picture, Wrap
 from parapoint.surfaces.parameterization import Charted
-from parapoint.surfaces.surface import FloatArray
+from parapoint.surfaces.surface import FloatArray, IntArray
 from parapoint.textures.baking import MARGIN, Done, dilated, painted, unwatched
 from parapoint.textures.texels import texels
 
@@ -25,8 +25,8 @@ def repainted(
 ) -> Picture:
     """(size, size, 3 or 4) the texture of a mesh with what its file paints on it.
 
-    Pictures repeat outside of the unit square, and are interpolated between their texels. Four
-    channels where a picture has an alpha.
+    Pictures go on outside of the unit square as their materials say, and are interpolated between
+    their texels. Four channels where a picture has an alpha.
 
     Args:
         charted: the mesh, and its new map in the unit square.
@@ -53,7 +53,7 @@ def repainted(
             material, here = painting.materials[number], of == number
             out[here, :3] = material.colour
             if material.picture is not None:
-                out[here] = _seen(material.picture, uv[here], width)
+                out[here] = _seen(material.picture, material.wraps, uv[here], width)
                 if tints and material.colour != WHITE:
                     light = _linear(out[here, :3] / 255) * _linear(np.array(material.colour) / 255)
                     out[here, :3] = 255 * srgb(light)
@@ -91,8 +91,18 @@ def _linear(parts: FloatArray) -> FloatArray:
     return np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
 
 
-def _seen(picture: Picture, uv: FloatArray, width: int) -> FloatArray:
-    """(n, width) a picture at points (n, 2), where it repeats; white where a point is NaN."""
+def _wrapped(index: IntArray, count: int, wrap: Wrap) -> IntArray:
+    """(n,) the rows of `count` that are seen where rows of any number are looked for."""
+    if wrap == "clamp":
+        return np.clip(index, 0, count - 1)
+    if wrap == "mirror":
+        index = index % (2 * count)
+        return np.minimum(index, 2 * count - 1 - index)
+    return index % count
+
+
+def _seen(picture: Picture, wraps: tuple[Wrap, Wrap], uv: FloatArray, width: int) -> FloatArray:
+    """(n, width) a picture at points (n, 2), as it goes on; white where a point is NaN."""
     height, across, channels = picture.shape
     known = np.asarray(np.isfinite(uv).all(axis=1))
     at = np.where(known[:, None], uv, 0)
@@ -104,8 +114,9 @@ def _seen(picture: Picture, uv: FloatArray, width: int) -> FloatArray:
     for down in (0, 1):
         for right in (0, 1):
             weight = np.abs(1 - down - part[:, 0]) * np.abs(1 - right - part[:, 1])
-            texel = picture[(line + down) % height, (column + right) % across]
-            total += weight[:, None] * texel
+            lines = _wrapped(line + down, height, wraps[1])
+            columns = _wrapped(column + right, across, wraps[0])
+            total += weight[:, None] * picture[lines, columns]
     out = np.full((len(uv), width), 255.0)
     out[known, :channels] = total[known, :width]
     out[~known, :3] = WHITE

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,15 +12,23 @@ import numpy as np
 from parapoint.errors import InputError
 from parapoint.files.decoding import plain
 from parapoint.files.meshes.obj import obj_lines
-from parapoint.files.meshes.pictures import WHITE, Material, bare_name, named_file, read_picture
+from parapoint.files.meshes.pictures import (
+    WHITE,
+    Material,
+    Wrap,
+    bare_name,
+    named_file,
+    read_picture,
+)
 from parapoint.surfaces.surface import IntArray
 
 LIBRARY = re.compile(r'"([^"]+)"|(\S.*?\.mtl)(?=\s|$)|(\S.*)', re.IGNORECASE)
 """One of several libraries on a line: in quotation marks, or up to its ending."""
 OF_PICTURE = re.compile(r"^\s*(map_\w+|bump|disp|decal|norm|refl)\b", re.IGNORECASE)
 """The word that begins a line of a material library which names a picture."""
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 OPTION = re.compile(
-    r"-(?:(?:mm|[ost])(?:\s+[-+.\deE]+)+|(?:blendu|blendv|bm|boost|cc|clamp|imfchan|texres|type)"
+    rf"-(?:(?:mm|[ost])(?:\s+{NUMBER}){{1,3}}|(?:blendu|blendv|bm|boost|cc|clamp|imfchan|texres|type)"
     r"\s+\S+)\s+"
 )
 """An option of a picture in a material library (Wavefront's specification)."""
@@ -82,15 +91,15 @@ def materials_of(libraries: list[Path]) -> dict[str, Material]:
                 name = rest
                 found[name] = Material()
             elif kind.lower() == "kd" and name:
-                found[name] = Material(_eight_bits(rest), found[name].picture)
+                found[name] = replace(found[name], colour=_eight_bits(rest))
             elif kind.lower() == "map_kd" and name and rest:
-                while (option := OPTION.match(rest)) is not None:
-                    rest = rest[option.end() :]
-                path = named_file(library.parent, rest)
+                picture, options = _picture_and_options(rest)
+                path = named_file(library.parent, picture)
                 if path is None:
-                    missing.append(rest)
+                    missing.append(picture)
                 else:
-                    found[name] = Material(found[name].colour, read_picture(path))
+                    of = Material(found[name].colour, read_picture(path))
+                    found[name] = _placed(of, options)
         if missing:
             logger.warning(
                 "%s: pictures that are not found are left out: %s",
@@ -98,6 +107,30 @@ def materials_of(libraries: list[Path]) -> dict[str, Material]:
                 ", ".join(dict.fromkeys(missing)),
             )
     return {bare_name(name): of for name, of in found.items()} | found
+
+
+def _picture_and_options(words: str) -> tuple[str, list[list[str]]]:
+    """The picture that a line names, and the words of each option before it."""
+    options = []
+    while (option := OPTION.match(words)) is not None:
+        options.append(option[0].split())
+        words = words[option.end() :]
+    return words, options
+
+
+def _placed(material: Material, options: list[list[str]]) -> Material:
+    """The material with its picture where the options -s, -o and -clamp of its line put it."""
+    for kind, *words in options:
+        if kind == "-clamp":
+            on: Wrap = "clamp" if words[0].lower() == "on" else "repeat"
+            material = replace(material, wraps=(on, on))
+        elif kind == "-s":
+            u, v = [*map(float, words), 1.0][:2]
+            material = replace(material, scale=(u, v))
+        elif kind == "-o":
+            u, v = [*map(float, words), 0.0][:2]
+            material = replace(material, offset=(u, v))
+    return material
 
 
 def _eight_bits(words: str) -> tuple[int, int, int]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,9 +13,19 @@ from parapoint.files.attributes import srgb
 from parapoint.files.meshes.gltf import opened
 from parapoint.files.meshes.gltf_primitives import draws_triangles
 from parapoint.files.meshes.materials import libraries, material_names, materials_of
-from parapoint.files.meshes.pictures import Material, Picture, bare_name, named_file, read_picture
+from parapoint.files.meshes.pictures import (
+    Material,
+    Picture,
+    Wrap,
+    bare_name,
+    named_file,
+    read_picture,
+)
 from parapoint.files.meshes.ply import pictures_of
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray
+
+WRAPS: dict[int, Wrap] = {33648: "mirror", 33071: "clamp"}
+"""How a picture goes on beyond its edges, by glTF's numbers; it repeats by any other."""
 
 logger = logging.getLogger("parapoint")
 
@@ -66,7 +77,9 @@ def painting_of(path: Path, polygon_of: IntArray, uv: FloatArray | None) -> Pain
     seen = [materials[k] for k in np.unique(used)]
     if len({one.colour for one in seen}) < 2 and all(one.picture is None for one in seen):
         return None
-    return Painting(materials, used, uv)
+    scales = np.array([one.scale for one in materials])[used, None]
+    offsets = np.array([one.offset for one in materials])[used, None]
+    return Painting(materials, used, uv * scales + offsets)
 
 
 def _obj(path: Path) -> tuple[tuple[Material, ...], IntArray]:
@@ -98,11 +111,13 @@ def _gltf(path: Path) -> tuple[tuple[Material, ...], IntArray]:
         base = given.get("pbrMetallicRoughness", {})
         linear = np.clip(np.array(base.get("baseColorFactor", (1, 1, 1))[:3], np.float64), 0, 1)
         red, green, blue = np.rint(255 * srgb(linear)).astype(int).tolist()
-        texture = base.get("baseColorTexture", {}).get("index")
-        source = None if texture is None else tree.tree["textures"][texture].get("source")
+        number = base.get("baseColorTexture", {}).get("index")
+        texture = {} if number is None else tree.tree["textures"][number]
+        source = texture.get("source")
         if source is not None and source not in pictures:
             pictures[source] = read_picture(tree.image(source))
-        materials.append(Material((red, green, blue), None if source is None else pictures[source]))
+        picture = None if source is None else pictures[source]
+        materials.append(Material((red, green, blue), picture, wraps=_wraps(tree.tree, texture)))
     materials.append(Material())
     of = [
         np.full(len(tree.triangles(one)), one.get("material", len(materials) - 1))
@@ -110,3 +125,10 @@ def _gltf(path: Path) -> tuple[tuple[Material, ...], IntArray]:
         if draws_triangles(one)
     ]
     return tuple(materials), np.concatenate(of)
+
+
+def _wraps(tree: dict[str, Any], texture: dict[str, Any]) -> tuple[Wrap, Wrap]:
+    """How the picture of a texture of a glTF file goes on beyond its edges, along u and v."""
+    sampler = tree["samplers"][texture["sampler"]] if "sampler" in texture else {}
+    u, v = (WRAPS.get(sampler.get(key, 0), "repeat") for key in ("wrapS", "wrapT"))
+    return u, v

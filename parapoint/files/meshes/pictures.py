@@ -7,7 +7,7 @@ import re
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +24,8 @@ ONLY_16_BITS = {("I", "PNG"), ("I", "PPM")}
 """Modes of Pillow and formats that together mean numbers from 0 to 65535."""
 
 Picture = npt.NDArray[np.uint8]
+Wrap = Literal["repeat", "mirror", "clamp"]
+"""Beyond its edge a picture begins anew, or runs back, or its last texel goes on."""
 
 
 @dataclass(frozen=True)
@@ -33,10 +35,16 @@ class Material:
     Attributes:
         colour: where it has no picture, 8-bit sRGB.
         picture: the picture of its colour, (H, W, 3 or 4), first row at the top, or None.
+        scale, offset: a UV of the file is multiplied by one, and the other is added, where it
+            reads the picture.
+        wraps: how the picture goes on beyond its edges, along u and along v.
     """
 
     colour: tuple[int, int, int] = WHITE
     picture: Picture | None = None
+    scale: tuple[float, float] = (1.0, 1.0)
+    offset: tuple[float, float] = (0.0, 0.0)
+    wraps: tuple[Wrap, Wrap] = ("repeat", "repeat")
 
 
 def read_picture(data: bytes | Path, name: str = "") -> Picture:

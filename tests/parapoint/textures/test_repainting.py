@@ -8,7 +8,7 @@ import pytest
 from parapoint import Mesh, Parameterization
 from parapoint.commands.mesh_output import MeshOutput
 from parapoint.files.meshes.painting import Painting
-from parapoint.files.meshes.pictures import WHITE, Material
+from parapoint.files.meshes.pictures import WHITE, Material, Wrap
 from parapoint.files.reading import Polygons
 from parapoint.surfaces.parameterization import Charted
 from parapoint.textures.repainting import repainted
@@ -48,3 +48,26 @@ def test_only_the_colours_of_gltf_tint_pictures(source: str, seen: int) -> None:
     given = Polygons(SQUARE.mesh, FACES, np.arange(2), ())
     output = MeshOutput(given, Path(source), Path("new.ply"), 16, 4, asked=False, painting=painting)
     assert abs(int(output.picture(SQUARE)[0, 0, 1]) - seen) <= 1
+
+
+STRIPES = np.repeat(np.array([[[10], [60], [110], [160]]], dtype=np.uint8), 3, axis=2)
+"""One line of four texels."""
+BEYOND = {
+    "repeat": [10, 60, 110, 160, 10, 60, 110, 160, 10, 60, 110, 160],
+    "mirror": [160, 110, 60, 10, 10, 60, 110, 160, 160, 110, 60, 10],
+    "clamp": [10, 10, 10, 10, 10, 60, 110, 160, 160, 160, 160, 160],
+}
+"""What is seen from -1 to 2 at the middles of texels."""
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("wrap", ["repeat", "mirror", "clamp"])
+def test_a_picture_goes_on_as_its_material_says(wrap: Wrap, axis: int) -> None:
+    """Along either axis; the other one repeats."""
+    wraps: tuple[Wrap, Wrap] = (wrap, "repeat") if axis == 0 else ("repeat", wrap)
+    shown = STRIPES if axis == 0 else STRIPES.transpose(1, 0, 2)[::-1]
+    uv = UV[FACES] * 3 - 1
+    painting = Painting((Material(picture=shown, wraps=wraps),), np.zeros(2, dtype=np.int64), uv)
+    picture = repainted(SQUARE, painting, 12)[..., 0]
+    along = picture[6] if axis == 0 else picture[::-1, 6]
+    assert along.tolist() == BEYOND[wrap]

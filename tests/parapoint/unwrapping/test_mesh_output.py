@@ -364,6 +364,26 @@ def test_a_glb_file_as_obj_shows_its_texture(tmp_path) -> None:
     assert np.abs(after - seen(tmp_path / "one.glb", old_picture(), at)).max() <= 6
 
 
+@pytest.mark.parametrize(
+    ("sampler", "wraps"),
+    [
+        ({}, ("repeat", "repeat")),
+        ({"wrapS": 33071}, ("clamp", "repeat")),
+        ({"wrapS": 10497, "wrapT": 33648}, ("repeat", "mirror")),
+    ],
+)
+def test_the_sampler_of_a_gltf_texture_says_how_it_goes_on(sampler, wraps, tmp_path) -> None:
+    source = tmp_path / "old.glb"
+    Image.fromarray(old_picture()).save(tmp_path / "old one.png")
+    gltf_sheet(source, SHOWN)
+    scene = opened(source)
+    scene.tree["textures"][0]["sampler"] = 0
+    scene.tree["samplers"] = [sampler]
+    source.write_bytes(glb_of(scene.tree, scene.chunk))
+    given = read_polygons(source)
+    assert painting_of(source, given.polygon_of, given.uv).materials[0].wraps == wraps
+
+
 def test_instances_are_refused_before_any_work(tmp_path) -> None:
     gltf_sheet(tmp_path / "old.glb", [])
     source = opened(tmp_path / "old.glb")

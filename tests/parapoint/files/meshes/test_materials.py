@@ -178,6 +178,31 @@ def test_pictures_are_found(words: str, key: str, tmp_path: Path) -> None:
     assert picture.shape == (3, 2, 3)
 
 
+@pytest.mark.parametrize(
+    ("options", "uv", "wraps"),
+    [
+        ("-s 2 3 1", (0.5, 1.5), ("repeat", "repeat")),
+        ("-s 2", (0.5, 0.5), ("repeat", "repeat")),
+        ("-o .25 -0.1 0", (0.5, 0.4), ("repeat", "repeat")),
+        ("-o 5e-1", (0.75, 0.5), ("repeat", "repeat")),
+        ("-clamp on -o 1 1 -s 4 1", (2, 1.5), ("clamp", "clamp")),
+        ("-clamp off -mm 0 1 -t 1 1 1", (0.25, 0.5), ("repeat", "repeat")),
+    ],
+)
+def test_options_place_a_picture(
+    options: str, uv: tuple[float, float], wraps: tuple[str, str], tmp_path: Path
+) -> None:
+    """Where u is 1/4 and v is 1/2."""
+    Image.new("RGB", (2, 3), RED).save(tmp_path / "old 1.png")
+    (tmp_path / "a.mtl").write_text(f"newmtl red\nmap_Kd {options} old 1.png\nKd 0 0 0\n")
+    corners = "vt 0.25 0.5\n" + MODEL.replace("f 1 2 3", "f 1/1 2/1 3/1")
+    given = polygons(path := model(tmp_path, "a.mtl", corners))
+    painting = painting_of(path, given.polygon_of, given.uv)
+    assert painting is not None
+    np.testing.assert_allclose(painting.uv[0], [uv] * 3)
+    assert painting.materials[1].wraps == wraps
+
+
 def test_a_picture_that_is_missing_is_named(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
