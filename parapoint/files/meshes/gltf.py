@@ -35,8 +35,17 @@ GLTF_TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 512
 GLTF_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 UNDERSTOOD = {"KHR_mesh_quantization", "KHR_texture_transform", "EXT_mesh_gpu_instancing"}
 """Extensions that are read where a file requires them."""
-APPEARANCE = ("KHR_materials_", "KHR_lights_", "KHR_texture_basisu", "EXT_texture_", "KHR_xmp")
+APPEARANCE = (
+    "KHR_materials_",
+    "KHR_lights_",
+    "KHR_texture_basisu",
+    "EXT_texture_",
+    "MSFT_texture_dds",
+    "KHR_xmp",
+)
 """How names of extensions begin that change no vertex and no UV."""
+SPECULAR = "KHR_materials_pbrSpecularGlossiness"
+"""The extension of materials that has a base colour of its own."""
 
 logger = logging.getLogger("parapoint")
 
@@ -153,6 +162,12 @@ class Gltf:
             start = view.get("byteOffset", 0)
             return self.buffer(view["buffer"])[start : start + view["byteLength"]]
         return self._loaded(1, item["uri"])
+
+    def image_name(self, index: int) -> str:
+        """What messages call an image: its name, its file or its number."""
+        item = self.tree["images"][index]
+        file = item.get("uri", "data:")
+        return str(item.get("name") or (f"image {index}" if file.startswith("data:") else file))
 
     def triangles(self, primitive: dict[str, Any]) -> IntArray:
         """(F, 3) rows of the vertices of a primitive of mode 4, 5 or 6."""
@@ -300,7 +315,7 @@ class Gltf:
         index = primitive.get("material")
         material = {} if index is None else self.tree["materials"][index]
         named = ("normalTexture", "occlusionTexture", "emissiveTexture")
-        textures = [material.get("pbrMetallicRoughness", {}).get("baseColorTexture")]
+        textures: list[Any] = [base_colour(material)[1]]
         textures += [material.get(name) for name in named]
         texture: dict[str, Any] = next((item for item in textures if item), {})
         moved = texture.get("extensions", {}).get("KHR_texture_transform", {})
@@ -386,7 +401,7 @@ class Gltf:
         number = primitive.get("material")
         material = {} if number is None else self.tree["materials"][number]
         colours = np.ones((count, 4))
-        colours *= material.get("pbrMetallicRoughness", {}).get("baseColorFactor", 1)
+        colours *= base_colour(material)[0]
         if (index := primitive["attributes"].get("COLOR_0")) is not None:
             given = self.stored(index)
             if len(given) != count:
@@ -396,6 +411,20 @@ class Gltf:
         colours = np.clip(np.nan_to_num(colours), 0, 1)
         colours[:, :3] = srgb(colours[:, :3])
         return colours.astype(np.float32)
+
+
+def base_colour(material: dict[str, Any]) -> tuple[list[float], dict[str, Any]]:
+    """The base colour of a material: a linear RGBA factor, and the texture; {} without one."""
+    if (diffuse := material.get("extensions", {}).get(SPECULAR)) is not None:
+        return diffuse.get("diffuseFactor", [1.0] * 4), diffuse.get("diffuseTexture", {})
+    base = material.get("pbrMetallicRoughness", {})
+    return base.get("baseColorFactor", [1.0] * 4), base.get("baseColorTexture", {})
+
+
+def image_of(texture: dict[str, Any]) -> int | None:
+    """The image of a texture, or else that of an extension, as WebP and KTX 2 have one."""
+    given = [texture, *texture.get("extensions", {}).values()]
+    return next((int(of["source"]) for of in given if "source" in of), None)
 
 
 def _vertex_colours(

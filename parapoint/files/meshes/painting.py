@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from parapoint.files.attributes import srgb
-from parapoint.files.meshes.gltf import opened
+from parapoint.files.meshes.gltf import Gltf, base_colour, image_of, opened
 from parapoint.files.meshes.gltf_primitives import draws_triangles
 from parapoint.files.meshes.materials import libraries, material_names, materials_of
 from parapoint.files.meshes.pictures import (
@@ -26,6 +26,8 @@ from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray
 
 WRAPS: dict[int, Wrap] = {33648: "mirror", 33071: "clamp"}
 """How a picture goes on beyond its edges, by glTF's numbers; it repeats by any other."""
+KTX = b"\xabKTX"
+"""How a picture begins that is packed for graphics cards (KHR_texture_basisu)."""
 
 logger = logging.getLogger("parapoint")
 
@@ -105,19 +107,18 @@ def _ply(path: Path) -> tuple[tuple[Material, ...], IntArray]:
 
 def _gltf(path: Path) -> tuple[tuple[Material, ...], IntArray]:
     tree = opened(path)
-    pictures: dict[int, Picture] = {}
+    pictures: dict[int | None, Picture | None] = {None: None}
     materials = []
     for given in tree.tree.get("materials", []):
-        base = given.get("pbrMetallicRoughness", {})
-        linear = np.clip(np.array(base.get("baseColorFactor", (1, 1, 1))[:3], np.float64), 0, 1)
+        factor, shown = base_colour(given)
+        linear = np.clip(np.array(factor[:3], np.float64), 0, 1)
         red, green, blue = np.rint(255 * srgb(linear)).astype(int).tolist()
-        number = base.get("baseColorTexture", {}).get("index")
-        texture = {} if number is None else tree.tree["textures"][number]
-        source = texture.get("source")
+        texture = tree.tree["textures"][shown["index"]] if "index" in shown else {}
+        source = image_of(texture)
         if source is not None and source not in pictures:
-            pictures[source] = read_picture(tree.image(source))
-        picture = None if source is None else pictures[source]
-        materials.append(Material((red, green, blue), picture, wraps=_wraps(tree.tree, texture)))
+            pictures[source] = _image(path, tree, source)
+        wraps = _wraps(tree.tree, texture)
+        materials.append(Material((red, green, blue), pictures[source], wraps=wraps))
     materials.append(Material())
     of = [
         np.full(len(tree.triangles(one)), one.get("material", len(materials) - 1))
@@ -125,6 +126,17 @@ def _gltf(path: Path) -> tuple[tuple[Material, ...], IntArray]:
         if draws_triangles(one)
     ]
     return tuple(materials), np.concatenate(of)
+
+
+def _image(path: Path, scene: Gltf, index: int) -> Picture | None:
+    """An image of a glTF file; None with a warning where it is packed as KTX 2."""
+    data, name = scene.image(index), scene.image_name(index)
+    if not data.startswith(KTX):
+        return read_picture(data, name)
+    logger.warning(
+        "%s: the picture %s is left out: KTX 2 is not read; export it as PNG or JPEG", path, name
+    )
+    return None
 
 
 def _wraps(tree: dict[str, Any], texture: dict[str, Any]) -> tuple[Wrap, Wrap]:

@@ -29,6 +29,8 @@ DATA = {"accessor", "attributes", "buffer", "bufferView", "indices"}
 """Keys under which extensions, as those of compression, number buffers, views and accessors."""
 TABLES = {"EXT_structural_metadata", "EXT_mesh_features", "EXT_instance_features"}
 """Extensions of tables that lie in buffer views, or point into such tables."""
+KINDS = {b"\x89PNG": "image/png", b"RIFF": "image/webp", b"\xabKTX": "image/ktx2"}
+"""What glTF calls an image, by its first bytes; "image/jpeg" with any others."""
 
 logger = logging.getLogger("parapoint")
 
@@ -264,7 +266,7 @@ class _Made:
         for index, image in enumerate(self.tree.get("images", [])):
             if not image.get("uri", "data:").startswith("data:"):
                 data = self.scene.image(index)
-                kind = "image/png" if data.startswith(b"\x89PNG") else "image/jpeg"
+                kind = KINDS.get(data[:4], "image/jpeg")
                 del image["uri"]
                 image |= {"bufferView": self._view(data), "mimeType": image.get("mimeType", kind)}
         _keep_used(self.tree, "accessors", list(_accessor_slots(self.tree)))

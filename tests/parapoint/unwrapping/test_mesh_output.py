@@ -384,6 +384,48 @@ def test_the_sampler_of_a_gltf_texture_says_how_it_goes_on(sampler, wraps, tmp_p
     assert painting_of(source, given.polygon_of, given.uv).materials[0].wraps == wraps
 
 
+SPECULAR = "KHR_materials_pbrSpecularGlossiness"
+WEBP = {"EXT_texture_webp": {"source": 0}}
+KTX = {"KHR_texture_basisu": {"source": 0}}
+ROSE = {"diffuseFactor": [1.0, 0.25, 0.25, 1.0], "diffuseTexture": {"index": 0}}
+
+
+@pytest.mark.parametrize(
+    ("extensions", "image", "material"),
+    [
+        (WEBP, "webp", SHOWN[0]),
+        (KTX, "ktx", SHOWN[0]),
+        (KTX, "jpeg", {"extensions": {SPECULAR: ROSE}}),
+        ({}, "png", {"extensions": {SPECULAR: ROSE}, **SHOWN[0]}),
+    ],
+)
+def test_pictures_of_gltf_extensions_are_seen_or_named(
+    extensions, image, material, tmp_path, caplog
+) -> None:
+    source, picture = tmp_path / "old.glb", tmp_path / "old one.png"
+    if image == "ktx":
+        picture.write_bytes(b"\xabKTX 20\xbb\r\n\x1a\n")
+    else:
+        Image.fromarray(old_picture()).save(picture, format=image)
+    gltf_sheet(source, [material])
+    scene = opened(source)
+    scene.tree["textures"] = [{"extensions": extensions} if extensions else {"source": 0}]
+    source.write_bytes(glb_of(scene.tree, scene.chunk))
+    given = read_polygons(source)
+    painting = painting_of(source, given.polygon_of, given.uv)
+    if image == "ktx":
+        assert painting is None
+        assert caplog.messages == [
+            f"{source}: the picture old%20one.png is left out: "
+            "KTX 2 is not read; export it as PNG or JPEG"
+        ]
+    else:
+        assert painting.largest == 64
+        rose = "extensions" in material
+        assert painting.materials[0].colour == ((255, 137, 137) if rose else (255, 255, 255))
+        assert not caplog.messages
+
+
 def test_instances_are_refused_before_any_work(tmp_path) -> None:
     gltf_sheet(tmp_path / "old.glb", [])
     source = opened(tmp_path / "old.glb")
