@@ -118,17 +118,29 @@ class MeshOutput:
         tree = opened(self.source).tree
         return not (tree.get("materials") or has_colours(tree))
 
+    @property
+    def _tints(self) -> bool:
+        """Whether colours of materials and vertices tint pictures, as they do in glTF."""
+        return self.source.suffix.lower() in {".glb", ".gltf"}
+
     def picture(self, placed: Charted, tell: Tell = untold) -> Picture:
         """What the texture shows: what the file does, or a checkerboard."""
         done = baking(tell)
+        colours = self.given.colours
+        if colours is not None and self.chosen is not None:
+            colours = colours[np.unique(self.given.mesh.faces[self.chosen])]
         if self.painting is not None:
             chosen = self.painting if self.chosen is None else self.painting.of_faces(self.chosen)
-            tints = self.source.suffix.lower() in {".glb", ".gltf"}
-            return repainted(placed, chosen, self.texture, self.margin, tints=tints, done=done)
-        colours = self.given.colours
+            return repainted(
+                placed,
+                chosen,
+                self.texture,
+                self.margin,
+                tints=self._tints,
+                colours=colours if self._tints else None,
+                done=done,
+            )
         if colours is not None:
-            if self.chosen is not None:
-                colours = colours[np.unique(self.given.mesh.faces[self.chosen])]
             return coloured(placed, colours, self.texture, self.margin, done=done)
         return checkerboard(self.texture)
 
@@ -198,9 +210,10 @@ class MeshOutput:
         return next((out for given, out in REWRITTEN if given == own and self.chosen is None), "")
 
     def _warn_of_extras(self) -> None:
-        shown = {"colours"} if self._gets_texture else set()
-        if shown and self.painting is not None:
-            shown.add("old UVs")
+        shown = set()
+        if self._gets_texture:
+            shown |= {"colours"} if self.painting is None or self._tints else set()
+            shown |= {"old UVs"} if self.painting is not None else set()
         left = [name for name in self.given.extras if name not in shown]
         if self.out.suffix.lower() in WITHOUT_STRAYS and not self.given.mesh.referenced.all():
             left.append("vertices without faces")

@@ -21,6 +21,7 @@ def repainted(
     margin: int = MARGIN,
     *,
     tints: bool = False,
+    colours: npt.NDArray[np.generic] | None = None,
     done: Done = unwatched,
 ) -> Picture:
     """(size, size, 3 or 4) the texture of a mesh with what its file paints on it.
@@ -34,6 +35,8 @@ def repainted(
         size: texels along a side.
         margin: texels around each chart that repeat its edge.
         tints: whether the colour of a material tints its picture, as it does in glTF.
+        colours: (V, 3 or 4) of the vertices, as `PointCloud` has them, or None; they tint pictures
+            in place of the material's colour, which they hold.
         done: is called on the way.
     """
     shown = texels(charted, size)
@@ -41,6 +44,7 @@ def repainted(
         one.picture is not None and one.picture.shape[2] == 4 for one in painting.materials
     )
     width = 4 if has_alpha else 3
+    light = None if colours is None else _linear(_known(colours))
 
     def values(_: FloatArray, rows: slice) -> FloatArray:
         faces = shown.faces[rows]
@@ -51,12 +55,14 @@ def repainted(
         of = painting.material_of[faces]
         for number in np.unique(of).tolist():
             material, here = painting.materials[number], of == number
-            out[here, :3] = material.colour
+            tint = None if material.colour == WHITE else _linear(np.array(material.colour) / 255)
+            if light is not None:
+                corners = light[charted.mesh.faces[faces[here]]]
+                tint = np.einsum("nc,ncd->nd", weights[here], corners)
             if material.picture is not None:
                 out[here] = _seen(material.picture, material.wraps, uv[here], width)
-                if tints and material.colour != WHITE:
-                    light = _linear(out[here, :3] / 255) * _linear(np.array(material.colour) / 255)
-                    out[here, :3] = 255 * srgb(light)
+            if tint is not None and (tints or material.picture is None):
+                out[here, :3] = 255 * srgb(tint * _linear(out[here, :3] / 255))
         return out
 
     flat = painted(shown, width, np.uint8, values, done)
@@ -76,7 +82,7 @@ def coloured(
     Vertices without a colour are white.
     """
     shown = texels(charted, size)
-    known = 255 * np.nan_to_num(unit_colours(colours[:, :3]).astype(np.float64), nan=1.0)
+    known = 255 * _known(colours)
 
     def values(_: FloatArray, rows: slice) -> FloatArray:
         corners = known[charted.mesh.faces[shown.faces[rows]]]
@@ -84,6 +90,11 @@ def coloured(
 
     flat = painted(shown, 3, np.uint8, values, done)
     return dilated(flat, shown, margin).astype(np.uint8, copy=False)
+
+
+def _known(colours: npt.NDArray[np.generic]) -> FloatArray:
+    """(V, 3) colours from 0 to 1; white where they are not known."""
+    return np.nan_to_num(unit_colours(colours[:, :3]).astype(np.float64), nan=1.0)
 
 
 def _linear(parts: FloatArray) -> FloatArray:

@@ -11,6 +11,7 @@ from PIL import Image
 
 from parapoint import InputError, Mesh, Parameterization
 from parapoint.commands.mesh_output import mesh_output
+from parapoint.files.attributes import srgb
 from parapoint.files.meshes.gltf import opened
 from parapoint.files.meshes.painting import painting_of
 from parapoint.files.meshes.ply import Table
@@ -351,17 +352,42 @@ def test_a_glb_file_keeps_all_but_the_uvs(materials, tmp_path, caplog) -> None:
     assert len(tree.tree["accessors"]) == len(used) + 2 + 2  # and indices, and the animation
 
 
-def test_a_glb_file_as_obj_shows_its_texture(tmp_path) -> None:
+@pytest.mark.parametrize("ending", [".obj", ".ply"])
+@pytest.mark.parametrize("has_colours", [False, True])
+def test_a_glb_file_as_another_shows_its_texture(ending, has_colours, tmp_path, caplog) -> None:
+    """Times the colours of its vertices, as light: their red grows from 0 to 24/255."""
     Image.fromarray(old_picture()).save(tmp_path / "old one.png")
     gltf_sheet(tmp_path / "old.glb", SHOWN)
     tree = opened(tmp_path / "old.glb").tree
     tree["nodes"] = tree["nodes"][:1]
     tree["scenes"][0]["nodes"] = [0]
+    if not has_colours:
+        del tree["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"]
     (tmp_path / "one.glb").write_bytes(glb_of(tree, opened(tmp_path / "old.glb").chunk))
-    written(tmp_path / "one.glb", tmp_path / "new.obj")
+    written(tmp_path / "one.glb", tmp_path / f"new{ending}")
     at = middles(tmp_path / "one.glb")
-    after = seen(tmp_path / "new.obj", np.asarray(Image.open(tmp_path / "new.png")), at).astype(int)
-    assert np.abs(after - seen(tmp_path / "one.glb", old_picture(), at)).max() <= 6
+    picture = np.asarray(Image.open(tmp_path / "new.png"))
+    after = seen(tmp_path / f"new{ending}", picture, at).astype(int)
+    wanted = seen(tmp_path / "one.glb", old_picture(), at).astype(np.float64)
+    if has_colours:
+        light = ((wanted[:, 0] / 255 + 0.055) / 1.055) ** 2.4 * (5 * at[:, 0] + at[:, 1]) / 255
+        wanted = np.stack([255 * srgb(light), 0 * light, 0 * light], axis=1)
+    assert np.abs(after - wanted).max() <= 6
+    assert "colours" not in caplog.text
+
+
+def test_colours_that_do_not_tint_are_named(tmp_path, caplog) -> None:
+    """A picture of a PLY file hides them."""
+    source = tmp_path / "old.ply"
+    rows = [f"{x} {y} 0 {x} {y} 9 9 9" for x, y in ((0, 0), (1, 0), (0, 1))]
+    names = [f"float {name}" for name in "xyzst"] + ["uchar red", "uchar green", "uchar blue"]
+    header = ["ply", "format ascii 1.0", "comment TextureFile old one.png", "element vertex 3"]
+    header += [*(f"property {name}" for name in names), "element face 1"]
+    header += ["property list uchar int vertex_indices", "end_header"]
+    source.write_text("\n".join([*header, *rows, "3 0 1 2\n"]))
+    Image.fromarray(old_picture()).save(tmp_path / "old one.png")
+    written(source, tmp_path / "new.glb")
+    assert "left out: colours. A .ply file would keep them" in caplog.text
 
 
 @pytest.mark.parametrize(
@@ -415,15 +441,16 @@ def test_pictures_of_gltf_extensions_are_seen_or_named(
     painting = painting_of(source, given.polygon_of, given.uv)
     if image == "ktx":
         assert painting is None
-        assert caplog.messages == [
-            f"{source}: the picture old%20one.png is left out: "
-            "KTX 2 is not read; export it as PNG or JPEG"
-        ]
+        said = "old%20one.png is left out: KTX 2 is not read; export it as PNG or JPEG"
+        assert caplog.messages == [f"{source}: the picture {said}"]
     else:
         assert painting.largest == 64
         rose = "extensions" in material
         assert painting.materials[0].colour == ((255, 137, 137) if rose else (255, 255, 255))
         assert not caplog.messages
+    written(source, tmp_path / "new.glb")  # which keeps the picture
+    kind = {"ktx": "image/ktx2"}.get(image, f"image/{image}")
+    assert opened(tmp_path / "new.glb").tree["images"][0]["mimeType"] == kind
 
 
 def test_instances_are_refused_before_any_work(tmp_path) -> None:
