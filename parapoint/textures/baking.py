@@ -256,10 +256,14 @@ def _batches(count: int) -> Iterator[slice]:
 
 
 def dilated(flat: Pixels, shown: Texels, margin: int) -> Pixels:
-    """(N, N, c) the image: texels of the surface, their edge repeated, and their mean elsewhere."""
+    """(N, N, c) the image: texels of the surface, their edge repeated, and their mean elsewhere.
+
+    There it is opaque, if it has an alpha.
+    """
     size = shown.size
     image: npt.NDArray[Any] = np.empty((size * size, flat.shape[1]), dtype=flat.dtype)
     image[:] = np.rint(flat.mean(axis=0))
+    image[:, 3:] = np.iinfo(flat.dtype).max
     image[shown.places] = flat
     empty = np.ones((size, size), dtype=bool)
     empty.reshape(-1)[shown.places] = False

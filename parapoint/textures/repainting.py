@@ -27,7 +27,7 @@ def repainted(
     """(size, size, 3 or 4) the texture of a mesh with what its file paints on it.
 
     Pictures go on outside of the unit square as their materials say, and are interpolated between
-    their texels. Four channels where a picture has an alpha.
+    their texels. Four channels where what is seen of a picture is not opaque.
 
     Args:
         charted: the mesh, and its new map in the unit square.
@@ -66,6 +66,8 @@ def repainted(
         return out
 
     flat = painted(shown, width, np.uint8, values, done)
+    if (flat[:, 3:] == 255).all():
+        flat = flat[:, :3]
     return dilated(flat, shown, margin).astype(np.uint8, copy=False)
 
 

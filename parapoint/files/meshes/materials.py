@@ -15,6 +15,7 @@ from parapoint.files.meshes.obj import obj_lines
 from parapoint.files.meshes.pictures import (
     WHITE,
     Material,
+    Picture,
     Wrap,
     bare_name,
     named_file,
@@ -85,21 +86,25 @@ def materials_of(libraries: list[Path]) -> dict[str, Material]:
     found: dict[str, Material] = {}
     for library in libraries:
         name, missing = "", []
+        files: dict[str, dict[str, Path]] = {}  # by material and word, the picture
         for line in library_lines(library, tells=True):
-            kind, rest = [*line.strip().split(None, 1), "", ""][:2]
-            if kind.lower() == "newmtl":
+            word, rest = [*line.strip().split(None, 1), "", ""][:2]
+            kind = word.lower()
+            if kind == "newmtl":
                 name = rest
-                found[name] = Material()
-            elif kind.lower() == "kd" and name:
+                found[name], files[name] = Material(), {}
+            elif kind == "kd" and name:
                 found[name] = replace(found[name], colour=_eight_bits(rest))
-            elif kind.lower() == "map_kd" and name and rest:
+            elif kind in {"map_kd", "map_d"} and name and rest:
                 picture, options = _picture_and_options(rest)
                 path = named_file(library.parent, picture)
                 if path is None:
                     missing.append(picture)
-                else:
-                    of = Material(found[name].colour, read_picture(path))
-                    found[name] = _placed(of, options)
+                    continue
+                files[name][kind] = path
+                found[name] = _placed(found[name], options)
+        for name, of in files.items():
+            found[name] = replace(found[name], picture=_picture(found[name].colour, of))
         if missing:
             logger.warning(
                 "%s: pictures that are not found are left out: %s",
@@ -107,6 +112,27 @@ def materials_of(libraries: list[Path]) -> dict[str, Material]:
                 ", ".join(dict.fromkeys(missing)),
             )
     return {bare_name(name): of for name, of in found.items()} | found
+
+
+def _picture(colour: tuple[int, int, int], files: dict[str, Path]) -> Picture | None:
+    """What a material shows of its picture (map_kd), as far as another (map_d) lets it be seen.
+
+    One picture that is both has an alpha for that. Of another one, that is the alpha, or else the
+    grey.
+    """
+    from PIL import Image
+
+    shown, mask = files.get("map_kd"), files.get("map_d")
+    picture = None if shown is None else read_picture(shown)
+    if mask is None or mask == shown:
+        return picture
+    given = read_picture(mask)
+    own = given[..., 3] if given.shape[2] == 4 and (given[..., 3] < 255).any() else given[..., 0]
+    if picture is None:
+        picture = np.full((*own.shape, 3), colour, np.uint8)
+    height, width = picture.shape[:2]
+    alpha = np.asarray(Image.fromarray(own).resize((width, height)))
+    return np.dstack([picture[..., :3], alpha])
 
 
 def _picture_and_options(words: str) -> tuple[str, list[list[str]]]:

@@ -117,8 +117,10 @@ def _gltf(path: Path) -> tuple[tuple[Material, ...], IntArray]:
         source = image_of(texture)
         if source is not None and source not in pictures:
             pictures[source] = _image(path, tree, source)
-        wraps = _wraps(tree.tree, texture)
-        materials.append(Material((red, green, blue), pictures[source], wraps=wraps))
+        picture, wraps = pictures[source], _wraps(tree.tree, texture)
+        if picture is not None:
+            picture = _with_alpha(picture, given, factor[3])
+        materials.append(Material((red, green, blue), picture, wraps=wraps))
     materials.append(Material())
     of = [
         np.full(len(tree.triangles(one)), one.get("material", len(materials) - 1))
@@ -137,6 +139,21 @@ def _image(path: Path, scene: Gltf, index: int) -> Picture | None:
         "%s: the picture %s is left out: KTX 2 is not read; export it as PNG or JPEG", path, name
     )
     return None
+
+
+def _with_alpha(picture: Picture, material: dict[str, Any], share: float) -> Picture:
+    """A picture with the alpha that a glTF material shows, which is `share` of its own.
+
+    Where the material is cut out, the alpha of its edge becomes a half.
+    """
+    mode, edge = material.get("alphaMode", "OPAQUE"), material.get("alphaCutoff", 0.5)
+    if mode == "OPAQUE" or (mode == "MASK" and edge <= 0):
+        return picture[..., :3]
+    if mode == "MASK":
+        share *= 0.5 / edge
+    own = picture[..., 3] if picture.shape[2] == 4 else np.full(picture.shape[:2], 255)
+    alpha = np.rint(np.clip(own * share, 0, 255))
+    return np.dstack([picture[..., :3], alpha.astype(np.uint8)])
 
 
 def _wraps(tree: dict[str, Any], texture: dict[str, Any]) -> tuple[Wrap, Wrap]:

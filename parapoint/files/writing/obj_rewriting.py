@@ -25,21 +25,25 @@ logger = logging.getLogger("parapoint")
 def write_library(out: Path, texture: npt.NDArray[Any] | None, given: list[Path]) -> str:
     """Write the materials of libraries beside an OBJ file, with one texture of all their colours.
 
-    The texture stands for all pictures of colours (map_Kd). Other pictures, which were drawn for
-    other UVs, are left out, and a warning names their kinds; without a texture so are all.
+    The texture stands for all pictures of colours (map_Kd), and for what they let through (map_d)
+    if it has an alpha. Other pictures, which were drawn for other UVs, are left out, and a warning
+    names their kinds; without a texture so are all.
 
     Returns:
         The line of the OBJ file that names the new library.
     """
     library = beside(out, ".mtl")
     image = "" if texture is None else write_picture(out, texture).name
+    held = {"map_kd": "map_Kd"}
+    if texture is not None and texture.shape[2] == 4:
+        held["map_d"] = "map_d"
     kept, left = [], set()
     for line in (line for path in given for line in library_lines(path)):
         word = OF_PICTURE.match(line)
         if word is None:
             kept.append(line)
-        elif image and word[1].lower() == "map_kd":
-            kept.append(f"map_Kd {image}")
+        elif image and word[1].lower() in held:
+            kept.append(f"{held[word[1].lower()]} {image}")
         else:
             left.add(word[1])
     if left:

@@ -410,6 +410,58 @@ def test_the_sampler_of_a_gltf_texture_says_how_it_goes_on(sampler, wraps, tmp_p
     assert painting_of(source, given.polygon_of, given.uv).materials[0].wraps == wraps
 
 
+CLEAR = {"none": [255], "holes": [0, 255], "glass": [60, 120, 180], "soft": [255, 254, 1, 0]}
+"""Alphas of the columns of a picture, by turns."""
+MODES = {"none": None, "holes": "MASK", "glass": "BLEND", "soft": "MASK"}
+
+
+def see_through(kind) -> np.ndarray:
+    """(64, 64, 4) the old picture with columns eight wide of alphas."""
+    alphas = np.array(CLEAR[kind], np.uint8)[np.arange(64) // 8 % len(CLEAR[kind])]
+    return np.dstack([old_picture(), np.broadcast_to(alphas, (64, 64))])
+
+
+@pytest.mark.parametrize("kind", CLEAR)
+def test_what_an_obj_lets_through_stays(kind, textured, tmp_path, caplog) -> None:
+    Image.fromarray(see_through(kind)).save(tmp_path / "old one.png")
+    with (tmp_path / "old.mtl").open("a") as file:
+        file.write("newmtl glass\nmap_Kd old one.png\nmap_d old one.png\n")
+    written(textured, tmp_path / "new.glb")
+    assert opened(tmp_path / "new.glb").tree["materials"][0].get("alphaMode") == MODES[kind]
+    written(textured, tmp_path / "new.obj")
+    picture = np.asarray(Image.open(tmp_path / "new.png"))
+    assert picture.shape[2] == (3 if kind == "none" else 4)
+    assert ("map_d new.png" in (tmp_path / "new.mtl").read_text()) == (kind != "none")
+    assert ("left out: map_Bump, map_d" in caplog.text) == (kind == "none")
+
+
+@pytest.mark.parametrize(
+    ("material", "alpha"),
+    [
+        ({}, None),
+        ({"alphaMode": "BLEND"}, 60),
+        ({"alphaMode": "MASK"}, 60),
+        ({"alphaMode": "MASK", "alphaCutoff": 0.25}, 120),
+        ({"alphaMode": "MASK", "alphaCutoff": 0}, None),
+        ({"alphaMode": "BLEND", "factor": [1, 1, 1, 0.5]}, 30),
+    ],
+)
+def test_what_a_gltf_lets_through_stays(material, alpha, tmp_path) -> None:
+    """As its material says."""
+    source = tmp_path / "old.glb"
+    Image.fromarray(see_through("glass")).save(tmp_path / "old one.png")
+    base = SHOWN[0]["pbrMetallicRoughness"] | {
+        "baseColorFactor": material.pop("factor", [1, 1, 1, 1])
+    }
+    gltf_sheet(source, [material | {"pbrMetallicRoughness": base}])
+    written(source, tmp_path / "new.obj")
+    picture = np.asarray(Image.open(tmp_path / "new.png"))
+    assert picture.shape[2] == (3 if alpha is None else 4)
+    assert alpha is None or picture[..., 3].min() == alpha
+    library = (tmp_path / "new.mtl").read_text()
+    assert ("map_Kd new.png\nmap_d new.png\n" in library) == (alpha is not None)
+
+
 SPECULAR = "KHR_materials_pbrSpecularGlossiness"
 WEBP = {"EXT_texture_webp": {"source": 0}}
 KTX = {"KHR_texture_basisu": {"source": 0}}

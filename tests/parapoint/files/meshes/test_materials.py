@@ -203,6 +203,30 @@ def test_options_place_a_picture(
     assert painting.materials[1].wraps == wraps
 
 
+@pytest.mark.parametrize(
+    ("lines", "seen"),
+    [
+        ("map_d alpha.png\nmap_Kd alpha.png", (9, 9, 9, 51)),
+        ("map_Kd red.png\nmap_d -imfchan m grey.png", (*RED, 102)),
+        ("map_Kd red.png\nmap_d alpha.png", (*RED, 51)),
+        ("map_Kd alpha.png\nmap_d grey.png", (9, 9, 9, 102)),
+        ("map_d grey.png\nKd 0 0 1", (*BLUE, 102)),
+        ("map_Kd red.png\nmap_d red.png", RED),
+    ],
+)
+def test_a_picture_lets_be_seen_what_another_shows(
+    lines: str, seen: tuple[int, ...], tmp_path: Path
+) -> None:
+    """Also one of another size."""
+    Image.new("RGBA", (2, 3), (9, 9, 9, 51)).save(tmp_path / "alpha.png")
+    Image.new("RGB", (2, 3), RED).save(tmp_path / "red.png")
+    Image.new("L", (5, 4), 102).save(tmp_path / "grey.png")
+    (tmp_path / "a.mtl").write_text(f"newmtl a\n{lines}\n")
+    picture = materials_of([tmp_path / "a.mtl"])["a"].picture
+    assert picture is not None
+    assert np.unique(picture.reshape(-1, len(seen)), axis=0).tolist() == [list(seen)]
+
+
 def test_a_picture_that_is_missing_is_named(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
