@@ -29,6 +29,7 @@ from parapoint.files.content import (
 )
 from parapoint.files.decoding import check_decoded, plain
 from parapoint.files.meshes.gltf_primitives import draws_points, draws_triangles, mode_triangles
+from parapoint.files.meshes.pictures import named_file
 from parapoint.surfaces.surface import FloatArray, IntArray
 
 GLTF_TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -140,19 +141,28 @@ class Gltf:
         return self.buffers[key]
 
     def _loaded(self, index: int, uri: str | None) -> bytes:
-        folder = self.folder
         if uri is None:
             if index or not self.chunk:  # a place holder for what an extension decodes
                 raise InputError("has a buffer without data; export it uncompressed")
             return self.chunk
         if uri.startswith("data:"):
             return base64.b64decode(uri.partition(",")[2])
-        path = (folder / unquote(uri)).resolve()
-        if not path.is_relative_to(folder.resolve()) or not path.is_file():
-            raise InputError(f"{uri[:80]!r} is not a file beside it")
-        data = path.read_bytes()
+        data = self._beside(uri).read_bytes()
         self.size += len(data)
         return data
+
+    def _beside(self, uri: str) -> Path:
+        """The file that the scene names, in the folder of the scene or below; as `named_file`.
+
+        Files elsewhere are not read, so that a file of unknown origin shows no other ones.
+        """
+        short = unquote(uri).replace("\\", "/").rpartition("/")[2]
+        found = [named_file(self.folder, name) for name in (unquote(uri), uri, short)]
+        for path in found:
+            if path is not None and path.resolve().is_relative_to(self.folder.resolve()):
+                return path
+        fault = "lies outside of its folder" if any(found) else "is not found"
+        raise InputError(f"names {uri[:80]!r}, which {fault}; put {short[:80]!r} beside it")
 
     def image(self, index: int) -> bytes:
         """The bytes of an image file: a piece of a buffer, in the text, or a file beside."""

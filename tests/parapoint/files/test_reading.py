@@ -510,7 +510,7 @@ def test_faulty_gltf(tmp_path):
         (lambda t: t["accessors"][0].update(count=10**9), "ends early"),
         (lambda t: t["accessors"][0].pop("bufferView"), "compressed"),
         (lambda t: t["nodes"][0].update(children=[1]), "two places"),
-        (lambda t: t["buffers"][0].update(uri="../../../etc/hostname"), "not a file beside it"),
+        (lambda t: t["buffers"][0].update(uri="../../../etc/hostname"), "put 'hostname' beside it"),
         (lambda t: t.update(meshes=[]), "no mesh"),
         (lambda t: t["accessors"][1].update(componentType=5126, count=3), "whole number"),
         (lambda t: t["nodes"][0].update(scale=[1e400, 1, 1]), "not finite"),

@@ -3,6 +3,7 @@
 import base64
 import io
 import json
+import re
 import struct
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from PIL import Image
 from parapoint import InputError, Mesh, PointCloud
 from parapoint.files.attributes import unit_colours
 from parapoint.files.meshes.gltf import opened
+from parapoint.files.meshes.painting import painting_of
 from parapoint.files.reading import FORMATS, Polygons, read_polygons, read_surface
 from parapoint.files.writing.gltf_rewriting import rewrite_gltf
 from parapoint.surfaces.parameterization import Parameterization
@@ -279,3 +281,51 @@ def test_a_file_without_extensions_is_copied_without_a_word(
     rewrite_gltf(path, tmp_path / "b.glb", made, np.zeros((2, 2, 3), np.uint8))
     assert opened(tmp_path / "b.glb").tree["extensionsUsed"] == ["MY"]
     assert not caplog.text
+
+
+@pytest.mark.parametrize(
+    "uri",
+    [
+        "deep/an%20image.bin",
+        "deep/an image.bin",
+        "DEEP\\An Image.BIN",
+        "C:\\models\\an image.bin",
+        "../elsewhere/flat.bin",
+        "flat.bin",
+        "per%20cent.bin",
+    ],
+)
+def test_files_are_found_as_other_programs_name_them(uri: str, tmp_path: Path) -> None:
+    """In the folder or below, in place of others that are named outside of it."""
+    folder = tmp_path / "scene"
+    for name in ("deep/an image.bin", "an image.bin", "flat.bin", "per%20cent.bin"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(b"here")
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "flat.bin").write_bytes(b"there")
+    tree = scene([SQUARE], {"attributes": {"POSITION": 0}}, images=[{"uri": uri}])
+    tree["buffers"].append({"uri": uri, "byteLength": 4})
+    file = opened(saved(folder, tree))
+    assert file.image(0) == file.buffer(1) == b"here"
+
+
+@pytest.mark.parametrize(
+    ("uri", "said"),
+    [
+        ("gone.png", "names 'gone.png', which is not found; put 'gone.png' beside it"),
+        ("../a%20b.png", "names '../a%20b.png', which lies outside of its folder; put 'a b.png'"),
+        ("data:image/png;base64,AAAA", "image 0: is no picture of a kind that is read; save it as"),
+        ("text.png", "text.png: is no picture of a kind that is read; save it as PNG or JPEG"),
+    ],
+)
+def test_a_picture_that_cannot_be_read_is_named(uri: str, said: str, tmp_path: Path) -> None:
+    folder = tmp_path / "scene"
+    folder.mkdir()
+    Image.new("RGB", (2, 3)).save(tmp_path / "a b.png")
+    (folder / "text.png").write_text("none")
+    shown = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}
+    drawn = {"attributes": {"POSITION": 0}, "indices": 1, "material": 0}
+    tree = scene([SQUARE, TRIANGLES], drawn, materials=[shown], textures=[{"source": 0}])
+    path = saved(folder, tree | {"images": [{"uri": uri}]})
+    with pytest.raises(InputError, match="^" + re.escape(said)):
+        painting_of(path, np.arange(2), np.zeros((2, 3, 2)))
