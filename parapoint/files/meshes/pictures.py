@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 import re
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -63,7 +64,10 @@ def read_picture(data: bytes | Path, name: str = "") -> Picture:
     from PIL import UnidentifiedImageError
 
     try:
-        with Images.open(data if isinstance(data, Path) else io.BytesIO(data)) as image:
+        with (
+            _unbounded(),
+            Images.open(data if isinstance(data, Path) else io.BytesIO(data)) as image,
+        ):
             return _pixels(image)
     except InputError as error:
         fault = str(error)
@@ -73,6 +77,19 @@ def read_picture(data: bytes | Path, name: str = "") -> Picture:
         fault = f"is no picture that can be read ({error})"
     name = str(data) if isinstance(data, Path) else name
     raise InputError(f"{name}: {fault}" if name else fault)
+
+
+@contextmanager
+def _unbounded() -> Iterator[None]:
+    """Leave the bound of a picture's size to us: inside, Pillow has none."""
+    from PIL import Image as Images
+
+    bound = Images.MAX_IMAGE_PIXELS
+    Images.MAX_IMAGE_PIXELS = None
+    try:
+        yield
+    finally:
+        Images.MAX_IMAGE_PIXELS = bound
 
 
 def _pixels(image: Image) -> Picture:

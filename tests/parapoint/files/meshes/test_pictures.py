@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from parapoint import InputError
-from parapoint.files.meshes.pictures import read_picture
+from parapoint.files.meshes.pictures import MOST_TEXELS, read_picture
 
 DEEP = np.array([[0, 257, 32_896], [51_400, 65_000, 65_535]], dtype=np.uint16)
 """Grey of 16 bits, and what it is of 8."""
@@ -44,3 +44,23 @@ def test_numbers_of_no_known_range_are_refused(kind: type, tmp_path: Path) -> No
     said = f"^{re.escape(str(path))}: is a picture of numbers of no known range; save it"
     with pytest.raises(InputError, match=said):
         read_picture(path)
+
+
+@pytest.mark.parametrize(
+    ("bound", "size"), [(10, (4, 4)), (4, (4, 4)), (None, (MOST_TEXELS + 1, 1))]
+)
+@pytest.mark.filterwarnings("error")
+def test_the_bound_of_a_picture_is_ours(
+    bound: int | None, size: tuple[int, int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Pillow warns above a bound of its own, and raises above its double; it keeps that bound."""
+    path = tmp_path / "a.png"
+    Image.new("L", size).save(path)
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", bound)
+    if max(size) <= MOST_TEXELS:
+        assert read_picture(path).shape == (4, 4, 3)
+    else:
+        said = f"{path}: is a picture of 16,385 by 1 texels; at most 16,384 along a side are read"
+        with pytest.raises(InputError, match=f"^{re.escape(said)}: make it smaller$"):
+            read_picture(path)
+    assert bound == Image.MAX_IMAGE_PIXELS
