@@ -20,6 +20,7 @@ from parapoint.files.meshes.pictures import (
     bare_name,
     named_file,
     read_picture,
+    readable,
 )
 from parapoint.surfaces.surface import IntArray
 
@@ -70,12 +71,13 @@ def library_lines(library: Path, *, tells: bool = False) -> list[str]:
     except OSError as error:
         fault = f"cannot be read: {error.strerror or error}"
     if tells:
-        logger.warning("%s: its materials are not known: it %s", library, fault)
+        name = readable(str(library))
+        logger.warning("%s: its materials are not known: it %s", name, fault)
     return []
 
 
 def materials_of(libraries: list[Path]) -> dict[str, Material]:
-    """The materials in Wavefront material libraries, by name.
+    """The materials in Wavefront material libraries, by name, as it is written and readable.
 
     Libraries and pictures that are missing are left out with a warning; a material without its
     picture shows its colour.
@@ -109,9 +111,9 @@ def materials_of(libraries: list[Path]) -> dict[str, Material]:
             logger.warning(
                 "%s: pictures that are not found are left out: %s",
                 library,
-                ", ".join(dict.fromkeys(missing)),
+                ", ".join(map(readable, dict.fromkeys(missing))),
             )
-    return {bare_name(name): of for name, of in found.items()} | found
+    return {readable(bare_name(name)): of for name, of in found.items()} | found
 
 
 def _picture(colour: tuple[int, int, int], files: dict[str, Path]) -> Picture | None:

@@ -20,6 +20,7 @@ from parapoint.files.meshes.pictures import (
     bare_name,
     named_file,
     read_picture,
+    readable,
 )
 from parapoint.files.meshes.ply import pictures_of
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray
@@ -87,7 +88,7 @@ def painting_of(path: Path, polygon_of: IntArray, uv: FloatArray | None) -> Pain
 def _obj(path: Path) -> tuple[tuple[Material, ...], IntArray]:
     known = materials_of(libraries(path)[0])
     names, of = material_names(path.read_bytes())
-    found = [name if name in known else bare_name(name) for name in names]
+    found = [name if name in known else readable(bare_name(name)) for name in names]
     unknown = [name for name in found if name and name not in known]
     if known and unknown:
         logger.warning("%s: no library holds its materials %s", path, ", ".join(unknown))
@@ -100,7 +101,7 @@ def _ply(path: Path) -> tuple[tuple[Material, ...], IntArray]:
     for name in names:
         found = named_file(path.parent, name)
         if found is None:
-            logger.warning("%s: the picture %s is not found", path, name)
+            logger.warning("%s: the picture %s is not found", path, readable(name))
         materials.append(Material(picture=None if found is None else read_picture(found)))
     return (*materials, Material()), np.where(number_of < len(names), number_of, len(names))
 

@@ -9,6 +9,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
+from unicodedata import normalize
 
 import numpy as np
 import numpy.typing as npt
@@ -122,16 +123,27 @@ def named_file(folder: Path, written: str) -> Path | None:
     """The file that another one in `folder` names; None where there is none.
 
     It is looked for as it is written and as a bare name, with any kind of slashes, in upper and
-    lower case, and in `folder` itself at last.
+    lower case, and in `folder` itself at last. Bytes of the name that are no UTF-8, as surrogates,
+    may also be Windows-1252.
     """
+    names = [written.strip(), bare_name(written)]
     with suppress(OSError):  # a name that is too long, a folder that may not be read
-        for name in (written.strip(), bare_name(written)):
+        for name in dict.fromkeys(names + [readable(name) for name in names]):
             path = Path(folder, name.replace("\\", "/"))
             for place in (path, folder / path.name):
                 found = _in_any_case(place)
                 if found.is_file():
                     return found
     return None
+
+
+def readable(name: str) -> str:
+    """A name as it can be printed: bytes that are no UTF-8, as surrogates, are Windows-1252."""
+    data = name.encode(errors="surrogateescape")
+    try:
+        return data.decode()
+    except UnicodeDecodeError:
+        return data.decode("cp1252", errors="replace")
 
 
 def bare_name(written: str) -> str:
@@ -141,12 +153,20 @@ def bare_name(written: str) -> str:
 
 
 def _in_any_case(path: Path) -> Path:
-    """The path, with the names of the folders where it differs from one of theirs in case alone."""
+    """The path, with the names of the folders where it differs from one of theirs in case alone.
+
+    An accent may be a character of its own, as on macOS.
+    """
     at = Path(path.anchor)
     for part in path.relative_to(at).parts:
         ahead = at / part
         if not ahead.exists() and at.is_dir():
-            same = [one for one in at.iterdir() if one.name.casefold() == part.casefold()]
+            same = [one for one in at.iterdir() if _alike(one.name) == _alike(part)]
             ahead = same[0] if len(same) == 1 else ahead
         at = ahead
     return at
+
+
+def _alike(name: str) -> str:
+    """What names have in common that people take for one."""
+    return normalize("NFC", name).casefold()

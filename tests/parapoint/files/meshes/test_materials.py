@@ -2,6 +2,8 @@
 
 import gzip
 from pathlib import Path
+from typing import Literal
+from unicodedata import normalize
 
 import numpy as np
 import pytest
@@ -17,6 +19,13 @@ from parapoint.surfaces.parameterization import Charted, Parameterization
 RED, BLUE, WHITE = (255, 0, 0), (0, 0, 255), (255, 255, 255)
 LIBRARY = "newmtl red\nKd 1 0 0\nnewmtl blue\nKd 0 0 1\n"
 MODEL = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nusemtl red\nf 1 2 3\nusemtl blue\nf 1 3 4\n"
+PLY = (
+    "ply\nformat ascii 1.0\ncomment TextureFile old\\One.PNG\nelement vertex 3\n"
+    "property float x\nproperty float y\nproperty float z\nproperty float u\nproperty float v\n"
+    "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    "0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n3 0 1 2\n"
+)
+"""A triangle that shows a picture."""
 
 
 def model(folder: Path, libraries: str, text: str = MODEL) -> Path:
@@ -236,6 +245,54 @@ def test_a_picture_that_is_missing_is_named(
     assert caplog.messages == [f"{library}: pictures that are not found are left out: gone.png"]
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "cp1252"])
+@pytest.mark.parametrize("form", ["NFC", "NFD"])
+@pytest.mark.parametrize("ending", [".obj", ".ply"])
+def test_names_of_any_encoding_are_found(
+    encoding: str, form: Literal["NFC", "NFD"], ending: str, tmp_path: Path
+) -> None:
+    """Whatever the file system makes of accents; a euro sign is not in Latin-1."""
+    Image.new("RGB", (2, 3), RED).save(tmp_path / normalize(form, "grün €.png"))
+    library = tmp_path / normalize(form, "kästchen.mtl")
+    library.write_bytes("newmtl grün\nmap_Kd Grün €.png\n".encode(encoding))
+    text = "mtllib kästchen.mtl\nvt 0 0\n" + MODEL.replace("1 2 3", "1/1 2/1 3/1")
+    text = text.replace("red", "grün").replace("usemtl blue\n", "")
+    if ending == ".ply":
+        text = PLY.replace("old\\One.PNG", "Grün €.png")
+    path = tmp_path / f"a{ending}"
+    path.write_bytes(text.encode(encoding))
+    sides = []
+    for file in (path, rewritten(path, tmp_path / f"€{ending}")):
+        given = polygons(file)
+        painting = painting_of(file, given.polygon_of, given.uv)
+        sides.append(0 if painting is None else painting.largest)
+    assert sides == [3, 8]
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "cp1252"])
+def test_names_of_any_encoding_are_readable(
+    encoding: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    text = MODEL.replace("red", "grün").encode(encoding)
+    for name in ("kästchen.mtl", "a.mtl"):
+        (tmp_path / "a.obj").write_bytes(f"mtllib {name}\n".encode(encoding) + text)
+        colours(tmp_path / "a.obj")
+        (tmp_path / "a.mtl").write_bytes("newmtl blue\nmap_Kd €.png\n".encode(encoding))
+    (tmp_path / "a.ply").write_bytes(PLY.replace("old\\One.PNG", "ö.png").encode(encoding))
+    colours(tmp_path / "a.ply")
+    assert caplog.messages == [
+        f"{tmp_path / 'kästchen.mtl'}: its materials are not known: it is not found",
+        f"{tmp_path / 'a.mtl'}: pictures that are not found are left out: €.png",
+        f"{tmp_path / 'a.obj'}: no library holds its materials grün",
+        f"{tmp_path / 'a.ply'}: the picture ö.png is not found",
+    ]
+
+
+def test_a_name_of_a_material_is_one_in_two_encodings(tmp_path: Path) -> None:
+    (tmp_path / "a.mtl").write_bytes(LIBRARY.replace("red", "grün").encode("cp1252"))
+    assert colours(model(tmp_path, "a.mtl", MODEL.replace("red", "grün"))) == [RED, BLUE]
+
+
 def test_names_that_are_no_utf8_stay(tmp_path: Path) -> None:
     """A library of a Windows program, written anew."""
     library = tmp_path / "a.mtl"
@@ -268,12 +325,7 @@ def test_reader_painter_and_writer_join_the_same_lines(text: str, tmp_path: Path
 
 def test_pictures_of_ply_are_found_alike(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     path = tmp_path / "a.ply"
-    path.write_text(
-        "ply\nformat ascii 1.0\ncomment TextureFile old\\One.PNG\nelement vertex 3\n"
-        "property float x\nproperty float y\nproperty float z\nproperty float u\nproperty float v\n"
-        "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
-        "0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n3 0 1 2\n"
-    )
+    path.write_text(PLY)
     given = polygons(path)
     assert painting_of(path, given.polygon_of, given.uv) is None
     assert caplog.messages == [f"{path}: the picture old\\One.PNG is not found"]
