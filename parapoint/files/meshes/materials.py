@@ -104,7 +104,8 @@ def materials_of(libraries: list[Path]) -> dict[str, Material]:
                     missing.append(picture)
                     continue
                 files[name][kind] = path
-                found[name] = _placed(found[name], options)
+                if kind == "map_kd" or "map_kd" not in files[name]:
+                    found[name] = _placed(found[name].colour, options)
         for name, of in files.items():
             found[name] = replace(found[name], picture=_picture(found[name].colour, of))
         if missing:
@@ -146,8 +147,9 @@ def _picture_and_options(words: str) -> tuple[str, list[list[str]]]:
     return words, options
 
 
-def _placed(material: Material, options: list[list[str]]) -> Material:
-    """The material with its picture where the options -s, -o and -clamp of its line put it."""
+def _placed(colour: tuple[int, int, int], options: list[list[str]]) -> Material:
+    """A material whose picture will lie where the options -s, -o and -clamp of its line say."""
+    material = Material(colour)
     for kind, *words in options:
         if kind == "-clamp":
             on: Wrap = "clamp" if words[0].lower() == "on" else "repeat"

@@ -201,9 +201,12 @@ def test_pictures_are_found(words: str, key: str, tmp_path: Path) -> None:
 def test_options_place_a_picture(
     options: str, uv: tuple[float, float], wraps: tuple[str, str], tmp_path: Path
 ) -> None:
-    """Where u is 1/4 and v is 1/2."""
+    """Where u is 1/4 and v is 1/2; those of map_d do not count beside map_Kd."""
     Image.new("RGB", (2, 3), RED).save(tmp_path / "old 1.png")
-    (tmp_path / "a.mtl").write_text(f"newmtl red\nmap_Kd {options} old 1.png\nKd 0 0 0\n")
+    mask = "map_d -s 7 7 7 -clamp on old 1.png\n"
+    (tmp_path / "a.mtl").write_text(
+        f"newmtl red\n{mask}map_Kd {options} old 1.png\nKd 0 0 0\n{mask}"
+    )
     corners = "vt 0.25 0.5\n" + MODEL.replace("f 1 2 3", "f 1/1 2/1 3/1")
     given = polygons(path := model(tmp_path, "a.mtl", corners))
     painting = painting_of(path, given.polygon_of, given.uv)
