@@ -10,6 +10,7 @@ import click
 from parapoint.commands.memory import memory_option
 from parapoint.commands.output import TEXTURE
 from parapoint.commands.progress import baking, bar
+from parapoint.console import LONGEST_MESSAGE, printable
 from parapoint.errors import InputError
 from parapoint.files.pieces import point_pieces
 from parapoint.files.png import png
@@ -84,7 +85,8 @@ def bake(
     if as_json:
         print(json.dumps(facts))
     else:
-        print(f"{out}: {kind} of {count} points in {texture} x {texture} texels")
+        name = printable(out, LONGEST_MESSAGE)
+        print(f"{name}: {kind} of {count} points in {texture} x {texture} texels")
 
 
 def _charted(model: str) -> Charted:

@@ -93,8 +93,11 @@ def checked_picture(
 
 
 def beside(path: Path, ending: str) -> Path:
-    """The file of this ending beside `path`; an OBJ file cannot name one that holds blanks."""
-    return path.with_name(re.sub(r"[\s#]", "_", path.stem) + ending)
+    """The file of this ending beside `path`, under a name that an OBJ file can write.
+
+    Blanks, comment signs, quotation marks and backslashes become underscores.
+    """
+    return path.with_name(re.sub(r"[\s#\"'\\]", "_", path.stem) + ending)
 
 
 def _check_inputs_stay(files: list[Path], inputs: list[Path]) -> None:

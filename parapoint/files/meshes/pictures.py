@@ -56,10 +56,11 @@ def named_file(folder: Path, written: str) -> Path | None:
     """The file that another one in `folder` names; None where there is none.
 
     It is looked for as it is written and as a bare name, with any kind of slashes, in upper and
-    lower case, and in `folder` itself at last.
+    lower case, and in `folder` itself at last; then by its name in Latin-1.
     """
+    latin = written.encode(errors="surrogateescape").decode("latin-1")
     with suppress(OSError):  # a name that is too long, a folder that may not be read
-        for name in (written.strip(), bare_name(written)):
+        for name in (written.strip(), bare_name(written), latin.strip(), bare_name(latin)):
             path = Path(folder, name.replace("\\", "/"))
             for place in (path, folder / path.name):
                 found = _in_any_case(place)

@@ -112,8 +112,9 @@ class Table:
 def opened(data: bytes) -> tuple[list[str], list[Table]]:
     """The comments of a PLY file, and its elements, whatever they are."""
     elements, body = _parts(data)
-    header = data.partition(b"end_header")[0].decode("latin-1").splitlines()
-    comments = [line.partition(" ")[2] for line in header if line.startswith("comment ")]
+    header = data.partition(b"end_header")[0].splitlines()
+    notes = [line.partition(b" ")[2] for line in header if line.startswith(b"comment ")]
+    comments = [line.decode(errors="surrogateescape") for line in notes]
     at = 0
     tables = []
     for name, count, properties in elements:
