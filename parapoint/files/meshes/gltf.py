@@ -154,6 +154,12 @@ class Gltf:
             return self.buffer(view["buffer"])[start : start + view["byteLength"]]
         return self._loaded(1, item["uri"])
 
+    def files(self) -> list[Path]:
+        """The files beside it that hold its buffers and pictures."""
+        items = [*self.tree.get("buffers", []), *self.tree.get("images", [])]
+        uris = [str(item.get("uri", "data:")) for item in items]
+        return [self.folder / unquote(uri) for uri in uris if not uri.startswith("data:")]
+
     def triangles(self, primitive: dict[str, Any]) -> IntArray:
         """(F, 3) rows of the vertices of a primitive of mode 4, 5 or 6."""
         if "indices" in primitive:

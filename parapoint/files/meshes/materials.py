@@ -84,8 +84,7 @@ def materials_of(libraries: list[Path]) -> dict[str, Material]:
             elif kind.lower() == "kd" and name:
                 found[name] = Material(_eight_bits(rest), found[name].picture)
             elif kind.lower() == "map_kd" and name and rest:
-                while (option := OPTION.match(rest)) is not None:
-                    rest = rest[option.end() :]
+                rest = _without_options(rest)
                 path = named_file(library.parent, rest)
                 if path is None:
                     missing.append(rest)
@@ -98,6 +97,22 @@ def materials_of(libraries: list[Path]) -> dict[str, Material]:
                 ", ".join(dict.fromkeys(missing)),
             )
     return {bare_name(name): of for name, of in found.items()} | found
+
+
+def library_pictures(library: Path) -> list[Path]:
+    """The pictures that a material library names and that are there, of whatever kind."""
+    lines = [
+        line.strip().split(None, 1) for line in library_lines(library) if OF_PICTURE.match(line)
+    ]
+    named = [named_file(library.parent, _without_options(line[1])) for line in lines if line[1:]]
+    return [path for path in named if path is not None]
+
+
+def _without_options(words: str) -> str:
+    """The name of a picture, without the options before it."""
+    while (option := OPTION.match(words)) is not None:
+        words = words[option.end() :]
+    return words
 
 
 def _eight_bits(words: str) -> tuple[int, int, int]:

@@ -112,9 +112,6 @@ class Table:
 def opened(data: bytes) -> tuple[list[str], list[Table]]:
     """The comments of a PLY file, and its elements, whatever they are."""
     elements, body = _parts(data)
-    header = data.partition(b"end_header")[0].splitlines()
-    notes = [line.partition(b" ")[2] for line in header if line.startswith(b"comment ")]
-    comments = [line.decode(errors="surrogateescape") for line in notes]
     at = 0
     tables = []
     for name, count, properties in elements:
@@ -122,14 +119,26 @@ def opened(data: bytes) -> tuple[list[str], list[Table]]:
         pairs = zip(properties, columns, strict=True)
         tables.append(Table(name, count, {item.name: Column(*one) for item, one in pairs}))
     body.check_end(at)
-    return comments, tables
+    return comments_of(data), tables
+
+
+def comments_of(data: bytes) -> list[str]:
+    """The comments in the header of a PLY file."""
+    header = data.partition(b"end_header")[0].splitlines()
+    notes = [line.partition(b" ")[2] for line in header if line.startswith(b"comment ")]
+    return [line.decode(errors="surrogateescape") for line in notes]
+
+
+def named_pictures(data: bytes) -> list[str]:
+    """The pictures that a PLY file names, in order."""
+    comments = comments_of(data)
+    return [line.removeprefix(PICTURE).strip() for line in comments if line.startswith(PICTURE)]
 
 
 def pictures_of(path: Path) -> tuple[list[str], IntArray]:
     """The pictures that a PLY file names, and (N,) the number of the one on each polygon."""
     data = plain(path.read_bytes())
-    comments, tables = opened(data)
-    names = [line.removeprefix(PICTURE).strip() for line in comments if line.startswith(PICTURE)]
+    names, (_, tables) = named_pictures(data), opened(data)
     first, *others = (table for table in tables if table.name in POLYGONS and table.count)
     if not others and "texnumber" in first.columns:
         return names, first.columns["texnumber"].values.astype(np.int64)
