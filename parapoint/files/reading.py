@@ -151,9 +151,10 @@ def read_polygons(path: str | Path) -> Polygons | PointCloud:
             "old UVs" if content.uv is not None else "",
             "polygons" if (content.sizes > 3).any() else "",
             *content.attributes,
+            *content.extras,
         ]
         polygon_of = np.searchsorted(np.cumsum(content.sizes), places[:, 0], side="right")
-        named = tuple(name for name in extras if name)
+        named = tuple(name for name in dict.fromkeys(extras) if name)
         colours = content.attributes.get("colours")
         return Polygons(mesh, places, polygon_of, named, _corner_uv(content, places), colours)
 

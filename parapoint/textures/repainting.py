@@ -41,6 +41,8 @@ def repainted(
         one.picture is not None and one.picture.shape[2] == 4 for one in painting.materials
     )
     width = 4 if has_alpha else 3
+    colours = np.array([one.colour for one in painting.materials], dtype=np.float64)
+    is_pictured = np.array([one.picture is not None for one in painting.materials])
 
     def values(_: FloatArray, rows: slice) -> FloatArray:
         faces = shown.faces[rows]
@@ -49,14 +51,14 @@ def repainted(
         uv = np.einsum("nc,ncd->nd", weights, painting.uv[faces])
         out = np.full((len(faces), width), 255.0)
         of = painting.material_of[faces]
-        for number in np.unique(of).tolist():
+        out[:, :3] = colours[of]
+        for number in np.unique(of[is_pictured[of]]).tolist():
             material, here = painting.materials[number], of == number
-            out[here, :3] = material.colour
-            if material.picture is not None:
-                out[here] = _seen(material.picture, uv[here], width)
-                if tints and material.colour != WHITE:
-                    light = _linear(out[here, :3] / 255) * _linear(np.array(material.colour) / 255)
-                    out[here, :3] = 255 * srgb(light)
+            assert material.picture is not None
+            out[here] = _seen(material.picture, uv[here], width)
+            if tints and material.colour != WHITE:
+                light = _linear(out[here, :3] / 255) * _linear(np.array(material.colour) / 255)
+                out[here, :3] = 255 * srgb(light)
         return out
 
     flat = painted(shown, width, np.uint8, values, done)

@@ -363,7 +363,20 @@ class Gltf:
             content.attributes["colours"] = vertices[:, 3:].astype(np.float32)
         if uvs:
             content.uv, content.uv_corners = np.concatenate(uvs), np.concatenate(uv_corners)
+        content.extras = self._extras(read)
         return content
+
+    def _extras(self, read: list[Placed]) -> tuple[str, ...]:
+        """What no mesh holds of the scene, in words."""
+        named = {"NORMAL": "normals", "TANGENT": "tangents", "JOINTS_0": "skins"}
+        held = {name for placed in read for name in placed.primitive["attributes"]}
+        of_vertices = held - {"POSITION", "COLOR_0", "TEXCOORD_0", "WEIGHTS_0"}
+        return (
+            *(named.get(name, name) for name in sorted(of_vertices)),
+            *(["morph targets"] if any("targets" in one.primitive for one in read) else []),
+            *(["objects"] if len(read) > 1 else []),
+            *(name for name in ("materials", "animations", "cameras") if self.tree.get(name)),
+        )
 
     def _points(self, placed_primitives: list[Placed]) -> Content:
         """The points of a scene without triangles, with their colours if some have any."""

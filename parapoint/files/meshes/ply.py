@@ -16,8 +16,16 @@ import numpy as np
 import numpy.typing as npt
 
 from parapoint.errors import InputError
-from parapoint.files.attributes import GEOMETRY, named_attributes, taken_normals
+from parapoint.files.attributes import (
+    GEOMETRY,
+    named_attributes,
+    named_colours,
+    spelled_colours,
+    taken_normals,
+    unit_colours,
+)
 from parapoint.files.content import (
+    FACE_COLOURS,
     NO_UV,
     Content,
     points_content,
@@ -254,7 +262,37 @@ def ply(data: bytes) -> Content:
     sizes, corners, uv_sizes, uv = (np.concatenate(part) for part in zip(*parts, strict=True))
     wedges = _ply_uv(columns, corners, sizes, uv_sizes, uv) if len(sizes) else (None, None)
     vertices, normals, attributes = _points_of(columns)
-    return Content(vertices, sizes, corners, normals, *wedges, attributes)
+    extras = _extras(elements)
+    return Content(vertices, sizes, corners, normals, *wedges, attributes, extras=extras)
+
+
+def _extras(elements: list[Element]) -> tuple[str, ...]:
+    """What no mesh holds of these elements, in words: properties of faces, and further elements."""
+    found = []
+    for name, count, properties in elements:
+        if name not in POLYGONS and name != "vertex" and count:
+            found.append(f"the element {name}")
+        elif name in POLYGONS and count:
+            left = [item.name for item in properties if item.name not in {*LISTS, "texnumber"}]
+            if colours := spelled_colours(left):
+                found.append(FACE_COLOURS)
+            found += [f"{name} of faces" for name in left if name not in colours]
+    return tuple(found)
+
+
+def face_colours(path: Path) -> npt.NDArray[np.uint8] | None:
+    """(N, 3) the colours of the faces of a PLY file; None where not all its polygons have one."""
+    tables = [one for one in opened(plain(path.read_bytes()))[1] if one.name in POLYGONS]
+    first, *others = (table for table in tables if table.count)
+    known = {name: of.values for name, of in first.columns.items() if of.sizes is None}
+    names = spelled_colours(list(known))
+    if others or not names:
+        return None
+    colours = named_colours(np.stack([known[name] for name in names], axis=1))
+    if colours is None:
+        return None
+    shares = np.nan_to_num(unit_colours(colours[:, :3]), nan=1.0)
+    return np.rint(255 * shares).astype(np.uint8)
 
 
 def _polygons(

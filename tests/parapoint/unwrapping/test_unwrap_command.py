@@ -256,7 +256,9 @@ def test_a_texture_that_an_obj_file_has_no_use_for_is_said(box, tmp_path, capsys
 
 def test_other_formats(box, tmp_path, capsys, caplog) -> None:
     unfold(box, tmp_path / "out.npz", capsys)
-    assert "left out: old UVs, polygons. A .obj file would keep them" in caplog.text
+    assert (
+        "left out: old UVs, polygons, normals, objects, groups, materials, lines. A" in caplog.text
+    )
     with np.load(tmp_path / "out.npz") as held:
         assert held["vertices"].shape == (8, 3)
         assert held["uv"].shape == (14, 2)
