@@ -507,14 +507,17 @@ def test_a_distortion_does_not_go_with_seams_that_are_given(box, tmp_path, capsy
 
 
 @pytest.mark.parametrize(
-    ("method", "seconds"),
+    ("method", "faces", "seconds"),
     [
-        (Unwrap(), 70.0),
-        (Unwrap(time_budget=20.0), 20.0),
-        (Unwrap(time_budget=90.0), 70.0),
-        (Unwrap(max_distortion=4.1), None),
-        (Unwrap(max_distortion=4.1, time_budget=90.0), 90.0),
+        (Unwrap(), [100_000], 70.07),
+        (Unwrap(), 500 * [4], 35.2),
+        (Unwrap(time_budget=20.0), [100_000], 20.0),
+        (Unwrap(time_budget=90.0), [100_000], 70.07),
+        (Unwrap(max_distortion=4.1), [100_000], None),
+        (Unwrap(max_distortion=4.1, time_budget=90.0), [100_000], 90.0),
     ],
 )
-def test_what_unwrapping_should_take_is_told(method, seconds) -> None:
-    assert expected(method, 100_000) == (seconds and pytest.approx(seconds, rel=1e-6))
+def test_what_unwrapping_should_take_is_told(method, faces, seconds) -> None:
+    """By the faces of each component, and for each component."""
+    told = expected(method, np.array(faces))
+    assert told == (seconds and pytest.approx(seconds, rel=1e-3))
