@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from parapoint.commands.memory import memory_option
+from parapoint.commands.names import NAME
 from parapoint.commands.output import TEXTURE
 from parapoint.commands.progress import baking, bar
 from parapoint.console import LONGEST_MESSAGE, printable
@@ -31,9 +32,9 @@ from parapoint.textures.thinning import thinned
 
 
 @click.command(no_args_is_help=True, options_metavar="[OPTIONS] --map KIND --out FILE")
-@click.argument("model", type=click.Path(), metavar="MODEL")
-@click.argument("cloud", type=click.Path(), metavar="CLOUD")
-@click.option("--out", type=click.Path(), required=True, metavar="FILE", help="FILE.png.")
+@click.argument("model", type=NAME, metavar="MODEL")
+@click.argument("cloud", type=NAME, metavar="CLOUD")
+@click.option("--out", type=NAME, required=True, metavar="FILE", help="FILE.png.")
 @click.option("--map", "kind", required=True, metavar="KIND", help=f"{', '.join(MAPS)}.")
 @click.option("--texture", type=int, default=TEXTURE, show_default=True, help="Texels a side.")
 @click.option("--margin", type=int, default=MARGIN, show_default=True, help="In texels.")

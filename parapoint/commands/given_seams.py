@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from parapoint.errors import InputError
 from parapoint.files.decoding import plain
-from parapoint.files.reading import UV_FORMATS, faults_of, read_parameterized
+from parapoint.files.reading import UV_FORMATS, check_file, faults_of, read_parameterized
 from parapoint.surfaces.parameterization import Charted
 from parapoint.surfaces.surface import IntArray, Mesh
 
@@ -41,6 +41,7 @@ def _seams_in(path: Path, mesh: Mesh) -> IntArray:
                 raise InputError(f"has a seam near {at} that is no edge of the mesh")
         return seams
     found = []
+    check_file(path)
     text = plain(path.read_bytes()).decode(errors="replace")
     for number, line in enumerate(text.splitlines(), start=1):
         words = line.split("#", 1)[0].split()

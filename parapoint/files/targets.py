@@ -73,15 +73,32 @@ def checked_target(
             _check_inputs_stay(files, [Path(given) for given in inputs])
             _check_sides_stay(files[1:])
         _check_writable(files)
-        unfinished = _unfinished(path)
-        unfinished.touch(exist_ok=False)
-        unfinished.unlink()
+        _try(path)
     except (OSError, RuntimeError, ValueError) as error:  # links in a circle; a NUL in the name
         if isinstance(error, InputError):
             raise
         detail = getattr(error, "strerror", None) or error
         raise InputError(f"{out}: cannot be written: {detail}") from None
     return path
+
+
+def check_folder(folder: Path) -> None:
+    """Check that files can be written into a folder that is there.
+
+    Raises:
+        InputError: they cannot.
+    """
+    try:
+        _try(folder / "file")
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written: {error.strerror or error}") from None
+
+
+def _try(path: Path) -> None:
+    """Write and remove a file beside `path`."""
+    unfinished = _unfinished(path)
+    unfinished.touch(exist_ok=False)
+    unfinished.unlink()
 
 
 def checked_picture(
