@@ -17,7 +17,8 @@ def parapoint() -> None:
     """UV maps of point clouds and meshes."""
     # The handler of last resort asks for sys.stderr at each line, which a progress bar replaces.
     assert logging.lastResort is not None
-    logging.basicConfig(format="%(message)s", handlers=[logging.lastResort])
+    logging.lastResort.setFormatter(console.PlainFormatter())
+    logging.basicConfig(handlers=[logging.lastResort])
 
 
 for name, place, summary in (

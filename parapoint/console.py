@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib
+import logging
 import sys
 from typing import TYPE_CHECKING, Any, Never
 
@@ -89,6 +90,14 @@ def printable(text: str, longest: int = LONGEST_NAME) -> str:
     if len(shown) <= longest:
         return shown
     return f"{shown[:longest]}… ({hashlib.sha256(shown.encode()).hexdigest()[:6]})"
+
+
+class PlainFormatter(logging.Formatter):
+    """The messages of a log alone, each as one line that a terminal reads as text."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """The line of a record."""
+        return printable(super().format(record), LONGEST_MESSAGE)
 
 
 def run(command: click.Command, arguments: list[str] | None = None) -> Never:

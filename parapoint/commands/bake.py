@@ -8,8 +8,10 @@ from pathlib import Path
 import click
 
 from parapoint.commands.memory import memory_option
+from parapoint.commands.names import NAME
 from parapoint.commands.output import TEXTURE
 from parapoint.commands.progress import baking, bar
+from parapoint.console import LONGEST_MESSAGE, printable
 from parapoint.errors import InputError
 from parapoint.files.pieces import point_pieces
 from parapoint.files.png import png
@@ -30,9 +32,9 @@ from parapoint.textures.thinning import thinned
 
 
 @click.command(no_args_is_help=True, options_metavar="[OPTIONS] --map KIND --out FILE")
-@click.argument("model", type=click.Path(), metavar="MODEL")
-@click.argument("cloud", type=click.Path(), metavar="CLOUD")
-@click.option("--out", type=click.Path(), required=True, metavar="FILE", help="FILE.png.")
+@click.argument("model", type=NAME, metavar="MODEL")
+@click.argument("cloud", type=NAME, metavar="CLOUD")
+@click.option("--out", type=NAME, required=True, metavar="FILE", help="FILE.png.")
 @click.option("--map", "kind", required=True, metavar="KIND", help=f"{', '.join(MAPS)}.")
 @click.option("--texture", type=int, default=TEXTURE, show_default=True, help="Texels a side.")
 @click.option("--margin", type=int, default=MARGIN, show_default=True, help="In texels.")
@@ -84,7 +86,8 @@ def bake(
     if as_json:
         print(json.dumps(facts))
     else:
-        print(f"{out}: {kind} of {count} points in {texture} x {texture} texels")
+        name = printable(out, LONGEST_MESSAGE)
+        print(f"{name}: {kind} of {count} points in {texture} x {texture} texels")
 
 
 def _charted(model: str) -> Charted:

@@ -12,12 +12,13 @@ import click
 from parapoint import saving
 from parapoint.commands.fitting import estimator_of, fitted
 from parapoint.commands.memory import memory_option
+from parapoint.commands.names import NAME
 from parapoint.commands.output import TEXTURE
 from parapoint.commands.progress import bar
 from parapoint.commands.telling import advice_of_cloud, lines, warn
 from parapoint.errors import InputError
 from parapoint.files.reading import read_surface
-from parapoint.files.targets import checked_target
+from parapoint.files.targets import check_folder
 from parapoint.fitting import Progress
 from parapoint.textures.placing import Placing
 from parapoint.unwrapping.quality import quality
@@ -26,8 +27,8 @@ logger = logging.getLogger("parapoint")
 
 
 @click.command(no_args_is_help=True, options_metavar="[OPTIONS] --out DIR")
-@click.argument("surface", type=click.Path(), metavar="INPUT")
-@click.option("--out", type=click.Path(), required=True, metavar="DIR", help="Folder of the model.")
+@click.argument("surface", type=NAME, metavar="INPUT")
+@click.option("--out", type=NAME, required=True, metavar="DIR", help="Folder of the model.")
 @click.option("--preset", default="computed", show_default=True, help="computed, learned or paper.")
 @click.option("--points", type=int, help="Most points that the map is fitted to.")
 @click.option("--iterations", type=int, help="Training steps.")
@@ -91,7 +92,7 @@ def _check_folder(folder: Path) -> None:
     there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
     if not there.is_dir():
         raise InputError(f"{there}: is a file; name a folder")
-    checked_target(there / "model.json")
+    check_folder(there)
 
 
 def _how_to_go_on(out: str) -> str:

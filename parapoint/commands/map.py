@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from parapoint.commands.memory import memory_option
+from parapoint.commands.names import NAME
 from parapoint.commands.output import target, write
 from parapoint.commands.progress import bar
 from parapoint.commands.telling import ADVICE_OF_MAPS, lines, warn
@@ -20,10 +21,10 @@ logger = logging.getLogger("parapoint")
 
 
 @click.command("map", no_args_is_help=True, options_metavar="[OPTIONS] --out FILE")
-@click.argument("model", type=click.Path(), metavar="DIR")
-@click.argument("surface", type=click.Path(), metavar="INPUT")
+@click.argument("model", type=NAME, metavar="DIR")
+@click.argument("surface", type=NAME, metavar="INPUT")
 @click.option(
-    "--out", type=click.Path(), required=True, metavar="FILE", help="FILE.obj, .glb, .ply or .npz."
+    "--out", type=NAME, required=True, metavar="FILE", help="FILE.obj, .glb, .ply or .npz."
 )
 @click.option("--device", default="auto", show_default=True, help="auto, cpu or cuda.")
 @click.option("--force", is_flag=True, help="Replace files of yours that are in the way.")

@@ -11,6 +11,7 @@ import numpy as np
 
 from parapoint.commands.output import SIDES, TEXTURE
 from parapoint.commands.progress import Tell, baking, untold
+from parapoint.files.content import FACE_COLOURS
 from parapoint.files.meshes.gltf import opened
 from parapoint.files.meshes.materials import libraries, material_names
 from parapoint.files.meshes.painting import Painting, painting_of
@@ -69,9 +70,7 @@ class MeshOutput:
     def is_rewritten(self) -> bool:
         """Whether the file is copied with new UVs, and all else stays."""
         pair = (self.source.suffix.lower(), self.out.suffix.lower())
-        if pair not in REWRITTEN or self.chosen is not None:
-            return False
-        return pair[0] != ".ply" or is_rewritable(self.source)
+        return pair in REWRITTEN and pair[1] == self._keeper
 
     @property
     def has_picture(self) -> bool:
@@ -81,7 +80,8 @@ class MeshOutput:
             return False
         if self.is_rewritten and ending == ".obj":
             return self.shows_old or not libraries(self.source)[0]
-        return ending == ".obj" or self.asked or self.painting is not None
+        is_shown = self.shows_old if self.is_rewritten else self.painting is not None
+        return ending == ".obj" or self.asked or is_shown
 
     @property
     def shows_old(self) -> bool:
@@ -207,13 +207,17 @@ class MeshOutput:
     def _keeper(self) -> str:
         """The ending of a file that would keep all but the UVs; "" for none."""
         own = self.source.suffix.lower()
-        return next((out for given, out in REWRITTEN if given == own and self.chosen is None), "")
+        if self.chosen is not None or (own == ".ply" and not is_rewritable(self.source)):
+            return ""
+        return next((out for given, out in REWRITTEN if given == own), "")
 
     def _warn_of_extras(self) -> None:
         shown = set()
-        if self._gets_texture:
-            shown |= {"colours"} if self.painting is None or self._tints else set()
-            shown |= {"old UVs"} if self.painting is not None else set()
+        if self._gets_texture and self.painting is None:
+            shown = {"colours"} & set(self.given.extras)
+        elif self._gets_texture:
+            shown = {"old UVs"} if self.shows_old else {FACE_COLOURS}
+            shown |= {"colours"} if self._tints else set()
         left = [name for name in self.given.extras if name not in shown]
         if self.out.suffix.lower() in WITHOUT_STRAYS and not self.given.mesh.referenced.all():
             left.append("vertices without faces")
@@ -221,7 +225,7 @@ class MeshOutput:
             logger.warning(
                 "%s: positions, triangles and new UVs are written%s; left out: %s%s",
                 self.out,
-                ", what it shows in a texture" if shown & set(self.given.extras) else "",
+                ", what it shows in a texture" if shown else "",
                 ", ".join(left),
                 f". A {kept} file would keep them" if (kept := self._keeper) else "",
             )

@@ -61,9 +61,10 @@ def preview_target(preview: str, out: str, inputs: list[str], *, force: bool) ->
     """The file for the picture beside `out`, checked before any work.
 
     Raises:
-        InputError: it is no .png or the texture of `out`, or it cannot or may not be written.
+        InputError: it is no .png or the texture of `out`; it cannot be written, or may not, as a
+            picture of the user's.
     """
-    path = checked_picture(preview, inputs=inputs, force=force)
+    path = checked_picture(preview, inputs=inputs, force=force, is_side=True)
     is_textured = Path(out).suffix.lower() in SIDES
     if is_textured and path.resolve() == beside(Path(out).resolve(), ".png"):
         raise InputError(f"{preview}: is the texture of {out}; take another name")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 
+from parapoint.console import LONGEST_MESSAGE, printable
 from parapoint.surfaces.areas import MOST_STARVED
 
 logger = logging.getLogger("parapoint")
@@ -64,7 +65,7 @@ def lines(facts: Facts) -> str:
     texels = f"{of['texels_per_unit']} texels per unit, {of['filled']} of the square filled"
     return "\n".join(
         [
-            f"{of['file']}: {', '.join(counts)} in {of['seconds']} s",
+            f"{printable(of['file'], LONGEST_MESSAGE)}: {', '.join(counts)} in {of['seconds']} s",
             f"{angles}; {stretch}",
             f"{part}; {of['flipped']} flipped faces, overlap: {of['overlap']}",
             f"{seam}; {texels}",

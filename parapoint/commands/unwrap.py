@@ -13,6 +13,7 @@ import click
 
 from parapoint.commands.fitting import estimator_of, fitted
 from parapoint.commands.memory import memory_option
+from parapoint.commands.names import NAME
 from parapoint.commands.output import TEXTURE, Y_UP, preview_target, target, write
 from parapoint.commands.progress import Tell, bar
 from parapoint.commands.telling import Facts, advice_of_cloud, lines, warn
@@ -35,10 +36,10 @@ logger = logging.getLogger("parapoint")
 
 
 @click.command(no_args_is_help=True, options_metavar="[OPTIONS] --out FILE")
-@click.argument("surface", type=click.Path(), metavar="INPUT")
+@click.argument("surface", type=NAME, metavar="INPUT")
 @click.option(
     "--out",
-    type=click.Path(),
+    type=NAME,
     required=True,
     metavar="FILE",
     help="FILE.glb, .obj, .ply or .npz.",
@@ -63,14 +64,19 @@ logger = logging.getLogger("parapoint")
 )
 @click.option("--max-distortion", type=float, metavar="E", help="Cut on until the energy is E.")
 @click.option(
-    "--seams", metavar="FILE", help="Cut along the edges it lists, or the seams of its map."
+    "--seams",
+    type=NAME,
+    metavar="FILE",
+    help="Cut along the edges it lists, or the seams of its map.",
 )
 @click.option("--per-vertex", is_flag=True, help="One uv for each vertex, whatever the seams.")
 @click.option("--texture", type=int, metavar="N", help="Texels along a side of a texture.")
 @click.option(
     "--margin", type=int, metavar="TEXELS", help="Free texels around the map and its charts."
 )
-@click.option("--preview", metavar="FILE", help="FILE.png: the surface beside its layout.")
+@click.option(
+    "--preview", type=NAME, metavar="FILE", help="FILE.png: the surface beside its layout."
+)
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--force", is_flag=True, help="Replace files of yours that are in the way.")
 @memory_option

@@ -40,13 +40,11 @@ def named_attributes(columns: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDAr
     """
     left = {name: of for name, of in columns.items() if name not in GEOMETRY}
     attributes = {}
-    for names in COLOUR_COLUMNS:
-        if found := _spelled(left, names):
-            colours = named_colours(np.stack([left[name] for name in found], axis=1))
-            if colours is not None:
-                attributes["colours"] = colours
-                left = {name: of for name, of in left.items() if name not in found}
-            break
+    if found := spelled_colours(list(left)):
+        colours = named_colours(np.stack([left[name] for name in found], axis=1))
+        if colours is not None:
+            attributes["colours"] = colours
+            left = {name: of for name, of in left.items() if name not in found}
     for name, values in left.items():
         attributes["intensity" if name.lower() in INTENSITIES else name] = values
     return attributes
@@ -55,12 +53,17 @@ def named_attributes(columns: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDAr
 def taken_normals(columns: dict[str, npt.NDArray[Any]]) -> npt.NDArray[np.float64] | None:
     """(P, 3) the normals among columns (P,), which are taken out of them; None without any."""
     for names in NORMAL_COLUMNS:
-        if found := _spelled(columns, names):
+        if found := _spelled(list(columns), names):
             return np.stack([columns.pop(name) for name in found], axis=1).astype(np.float64)
     return None
 
 
-def _spelled(columns: dict[str, npt.NDArray[Any]], names: tuple[str, ...]) -> list[str]:
+def spelled_colours(columns: list[str]) -> list[str]:
+    """The names of the parts of a colour among columns, as they are spelled; [] without any."""
+    return next((found for names in COLOUR_COLUMNS if (found := _spelled(columns, names))), [])
+
+
+def _spelled(columns: list[str], names: tuple[str, ...]) -> list[str]:
     """These names as the columns spell them, in capitals or not; [] where one is missing."""
     spelled = {name.lower(): name for name in columns}
     return [spelled[name] for name in names] if set(names) <= set(spelled) else []

@@ -38,6 +38,7 @@ class Content:
         uv_corners: like `corners`, rows of `uv`; NO_UV where a corner has none.
         attributes: whatever else is known at each vertex, (V,) or (V, k) by name; see `PointCloud`.
         rows: (V,) row of each point among those of the file, where some were left out.
+        extras: what else a mesh file holds, in words.
     """
 
     vertices: FloatArray
@@ -48,6 +49,11 @@ class Content:
     uv_corners: IntArray | None = None
     attributes: dict[str, npt.NDArray[Any]] = field(default_factory=dict)
     rows: IntArray | None = None
+    extras: tuple[str, ...] = ()
+
+
+FACE_COLOURS = "colours of faces"
+"""How `Content.extras` calls them."""
 
 
 def points_content(

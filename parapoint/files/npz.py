@@ -12,6 +12,9 @@ from parapoint.files.attributes import named_colours
 from parapoint.files.content import Content, points_content
 from parapoint.files.decoding import opened_archive
 
+OF_MESHES = {"vertices", "faces", "uv", "corners", "colours", "colors"}
+"""Arrays of a mesh that are read."""
+
 logger = logging.getLogger("parapoint")
 
 
@@ -34,6 +37,7 @@ def npz(data: bytes) -> Content:
             content.uv, content.uv_corners = arrays["uv"], uv_corners.reshape(-1)
         given = arrays.get("colours", arrays.get("colors"))
         content.attributes = _colours(given, len(content.vertices))
+        content.extras = tuple(name for name in arrays if name not in OF_MESHES)
         return content
     if "points" not in arrays:
         raise InputError("has no array 'points'; a point map has points and uv")

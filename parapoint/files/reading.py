@@ -151,9 +151,10 @@ def read_polygons(path: str | Path) -> Polygons | PointCloud:
             "old UVs" if content.uv is not None else "",
             "polygons" if (content.sizes > 3).any() else "",
             *content.attributes,
+            *content.extras,
         ]
         polygon_of = np.searchsorted(np.cumsum(content.sizes), places[:, 0], side="right")
-        named = tuple(name for name in extras if name)
+        named = tuple(name for name in dict.fromkeys(extras) if name)
         colours = content.attributes.get("colours")
         return Polygons(mesh, places, polygon_of, named, _corner_uv(content, places), colours)
 
@@ -250,20 +251,29 @@ def has_faces(path: str | Path) -> bool:
 
 def _content(path: Path) -> Content:
     """What the file holds, by the reader of its ending."""
-    if path.is_dir():
-        raise InputError("is a folder, not a file")
-    if not path.exists():
-        raise InputError("no such file")
+    check_file(path)
     if path.suffix.lower() not in FORMATS:
         raise InputError(f"has an unknown ending; known are {', '.join(FORMATS)}")
-    if not path.is_file():
-        raise InputError("is not a regular file")
     reader = FORMATS[path.suffix.lower()]
     data = path.read_bytes()
     with unreadable(path):
         content = reader(data if path.suffix.lower() == ".npz" else plain(data), path.parent)
     check_fits_together(content)
     return content
+
+
+def check_file(path: Path) -> None:
+    """Check that there is a file that can be read more than once.
+
+    Raises:
+        InputError: there is none, or a folder, a pipe or a device.
+    """
+    if path.is_dir():
+        raise InputError("is a folder, not a file")
+    if str(path) == "-" or (path.exists() and not path.is_file()):
+        raise InputError("pipes and devices are not read; write to a file, and name that")
+    if not path.exists():
+        raise InputError("no such file")
 
 
 @contextmanager

@@ -2,7 +2,8 @@
 
 The file that `--out` names may be replaced. The files beside it (a texture, a material) may be
 replaced only if we wrote them and nobody has changed them since, which the seal at their end
-tells. An input is never replaced. `--force` lifts all three rules.
+tells; so may the picture of `--preview`. An input is never replaced, nor is a library or a picture
+that an input names. `--force` lifts these rules. A write-protected file stays in any case.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import logging
 import os
 import re
 import secrets
+import shutil
 import struct
 import zlib
 from collections.abc import Iterable, Iterator
@@ -20,6 +22,7 @@ from pathlib import Path
 from typing import IO
 
 from parapoint.errors import InputError
+from parapoint.files.naming import files_named_in
 
 SEAL = b"ParaPoint wrote this: "
 """What stands before the SHA-256 digest of all bytes that precede it in a file of ours."""
@@ -50,7 +53,8 @@ def checked_target(
 
     Raises:
         InputError: the folder does not exist or cannot be written to; the name is too long; there
-            is something other than a file; an input or a file of the user's would be replaced.
+            is something other than a file, or a write-protected one; an input or a file of the
+            user's would be replaced.
     """
     path = Path(out)
     try:
@@ -68,9 +72,8 @@ def checked_target(
         if not force:
             _check_inputs_stay(files, [Path(given) for given in inputs])
             _check_sides_stay(files[1:])
-        unfinished = _unfinished(path)
-        unfinished.touch(exist_ok=False)
-        unfinished.unlink()
+        _check_writable(files)
+        _try(path)
     except (OSError, RuntimeError, ValueError) as error:  # links in a circle; a NUL in the name
         if isinstance(error, InputError):
             raise
@@ -79,45 +82,100 @@ def checked_target(
     return path
 
 
+def check_folder(folder: Path) -> None:
+    """Check that files can be written into a folder that is there.
+
+    Raises:
+        InputError: they cannot.
+    """
+    try:
+        _try(folder / "file")
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written: {error.strerror or error}") from None
+
+
+def _try(path: Path) -> None:
+    """Write and remove a file beside `path`."""
+    unfinished = _unfinished(path)
+    unfinished.touch(exist_ok=False)
+    unfinished.unlink()
+
+
 def checked_picture(
-    out: str | Path, *, inputs: Iterable[str | Path] = (), force: bool = False
+    out: str | Path,
+    *,
+    inputs: Iterable[str | Path] = (),
+    force: bool = False,
+    is_side: bool = False,
 ) -> Path:
     """The PNG file that is to be written for `out`; see `checked_target`.
+
+    Args:
+        out: the file that the user named.
+        inputs: files that are read, which must not be replaced.
+        force: replace whatever is there.
+        is_side: whether it comes beside the file of `--out`, and replaces a picture of ours alone.
 
     Raises:
         InputError: its name does not end in .png, or it cannot or may not be written.
     """
     if Path(out).suffix.lower() != ".png":
         raise InputError(f"{out}: a picture is written as PNG; give a name that ends in .png")
-    return checked_target(out, inputs=inputs, force=force)
+    path = checked_target(out, inputs=inputs, force=force)
+    if is_side and not force:
+        _check_sides_stay([path])
+    return path
 
 
 def beside(path: Path, ending: str) -> Path:
-    """The file of this ending beside `path`; an OBJ file cannot name one that holds blanks."""
-    return path.with_name(re.sub(r"[\s#]", "_", path.stem) + ending)
+    """The file of this ending beside `path`, under a name that an OBJ file can write.
+
+    Blanks, comment signs, quotation marks and backslashes become underscores.
+    """
+    return path.with_name(re.sub(r"[\s#\"'\\]", "_", path.stem) + ending)
 
 
 def _check_inputs_stay(files: list[Path], inputs: list[Path]) -> None:
-    for file in files:
-        if file.exists() and any(given.exists() and file.samefile(given) for given in inputs):
+    there = [file for file in files if file.exists()]
+    given = [path for path in inputs if path.is_file()] if there else []
+    for file in there:
+        if any(file.samefile(path) for path in given):
             raise InputError(f"{file}: is the input, which is not replaced; take another name")
+    for path in given:
+        named = files_named_in(path)
+        for file in there:
+            if any(file.samefile(one) for one in named):
+                raise InputError(
+                    f"{file}: is named by {path}, so it is not replaced; take another name"
+                )
 
 
 def _check_sides_stay(sides: list[Path]) -> None:
     for side in sides:
         if side.is_symlink() or (side.exists() and not is_ours(side)):
             raise InputError(
-                f"{side}: is a file of yours that would be replaced; take another --out, or --force"
+                f"{side}: is a file of yours that would be replaced; take another name, or --force"
             )
+
+
+def _check_writable(files: list[Path]) -> None:
+    for file in files:
+        if file.exists() and not os.access(file, os.W_OK):
+            raise InputError(f"{file}: is write-protected; take another name, or make it writable")
 
 
 @contextmanager
 def complete_file(path: Path) -> Iterator[IO[bytes]]:
-    """A file to write, which takes its name only at the end: nobody ever sees half of it."""
+    """A file to write, which takes its name only at the end: nobody ever sees half of it.
+
+    Where it replaces a file, it keeps who may read and write that.
+    """
     unfinished = _unfinished(path)
     try:
         with unfinished.open("xb") as file:
             yield file
+        with suppress(FileNotFoundError):
+            shutil.copymode(path, unfinished)
         unfinished.replace(path)
     except OSError as error:
         # A full disk names no file, and nobody knows the name of the unfinished one.

@@ -45,6 +45,8 @@ def repainted(
     )
     width = 4 if has_alpha else 3
     light = None if colours is None else _linear(_known(colours))
+    flat_colours = np.array([one.colour for one in painting.materials], dtype=np.float64)
+    is_even = np.array([one.picture is None and light is None for one in painting.materials])
 
     def values(_: FloatArray, rows: slice) -> FloatArray:
         faces = shown.faces[rows]
@@ -53,12 +55,14 @@ def repainted(
         uv = np.einsum("nc,ncd->nd", weights, painting.uv[faces])
         out = np.full((len(faces), width), 255.0)
         of = painting.material_of[faces]
-        for number in np.unique(of).tolist():
+        out[:, :3] = flat_colours[of]
+        for number in np.unique(of[~is_even[of]]).tolist():
             material, here = painting.materials[number], of == number
             tint = None if material.colour == WHITE else _linear(np.array(material.colour) / 255)
             if light is not None:
                 corners = light[charted.mesh.faces[faces[here]]]
                 tint = np.einsum("nc,ncd->nd", weights[here], corners)
+            out[here] = 255.0
             if material.picture is not None:
                 out[here] = _seen(material.picture, material.wraps, uv[here], width)
             if tint is not None and (tints or material.picture is None):

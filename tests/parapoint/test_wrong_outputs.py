@@ -17,6 +17,18 @@ READERS += ("bake.point_pieces", "bake.read_parameterized")
 
 CASES = [
     *(
+        (arguments, f"error: {name} is an empty name; name a file or a folder")
+        for arguments, name in (
+            (["unwrap", "", "--out", "a.obj"], "INPUT"),
+            (["fit", "", "--out", "a"], "INPUT"),
+            (["map", "", "scan.xyz", "--out", "a.obj"], "DIR"),
+            (["bake", "mesh.obj", "", "--map", "colour", "--out", "a.png"], "CLOUD"),
+            *(([*command, "--out", ""], "--out") for command in (UNWRAP, FIT, MAP, BAKE)),
+            ([*MESH, "--out", "a.obj", "--preview", ""], "--preview"),
+            ([*MESH, "--out", "a.obj", "--seams", ""], "--seams"),
+        )
+    ),
+    *(
         ([*command, "--out", out], message)
         for command, good in ((UNWRAP, ".glb"), (MESH, ".obj"), (MAP, ".ply"), (BAKE, ".png"))
         for out, message in (
@@ -29,8 +41,8 @@ CASES = [
     ),
     (["fit", "scan.xyz", "--out", "scan.xyz"], "is a file; name a folder"),
     ([*FIT, "--out", "scan.xyz/model"], "is a file; name a folder"),
-    ([*FIT, "--out", "locked"], "cannot be written: permission denied"),
-    ([*FIT, "--out", "locked/deep/model"], "cannot be written: permission denied"),
+    ([*FIT, "--out", "locked"], "error: locked: cannot be written: permission denied"),
+    ([*FIT, "--out", "locked/deep/model"], "locked: cannot be written: permission denied"),
     ([*FIT, "--out", "theirs"], "is in the way and not ours"),
     ([*MESH, "--out", "mesh.obj"], "is the input"),
     (["map", "model", "mesh.obj", "--out", "mesh.obj"], "is the input"),

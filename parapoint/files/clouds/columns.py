@@ -43,11 +43,17 @@ class Columns(NamedTuple):
     is_whole: bool
     may_vary: bool
 
-    def content(self, values: FloatArray) -> Content:
-        """What the numbers (P, 3 + k) in the columns `axes` and `others` mean."""
+    def content(self, values: FloatArray, *, has_intensity: bool) -> Content:
+        """What the numbers (P, 3 + k) in the columns `axes` and `others` mean.
+
+        Args:
+            values: the numbers.
+            has_intensity: whether the first single column is the intensity by rule, as in PTS.
+        """
         filled = [k for k in range(3, values.shape[1]) if not np.isnan(values[:, k]).all()]
         if not self.names:
-            return points_content(values[:, :3], *_further_columns(values[:, [0, 1, 2, *filled]]))
+            known = values[:, [0, 1, 2, *filled]]
+            return points_content(known[:, :3], *_further_columns(known, has_intensity))
         columns: dict[str, npt.NDArray[Any]] = {}
         for k in filled:
             at = self.others[k - 3]
@@ -201,14 +207,23 @@ def _say_unnamed(headings: list[Heading], widths: set[int]) -> None:
 
 
 def _further_columns(
-    values: FloatArray,
+    values: FloatArray, has_intensity: bool
 ) -> tuple[FloatArray | None, dict[str, npt.NDArray[Any]]]:
     """Normals, or None, and attributes in the columns behind x y z of (P, 3 + k) numbers.
 
     Three columns together are normals where all have length 1, and colours where all are whole
     numbers from 0 to 255 or fractions from 0 to 1. Single columns come before them, as in PTS: the
-    first is the intensity.
+    first is the intensity. Where that is no rule, a column behind three of colours that holds the
+    largest part of a colour alone is their alpha, and is left out.
     """
+    alpha = None if has_intensity else _opaque(values)
+    if alpha is not None:
+        values = np.delete(values, alpha, axis=1)
+    elif not has_intensity and _are_four(values):
+        logger.warning(
+            "columns 4 to 7 are taken as intensity, red, green and blue; if they are red, green, "
+            "blue and alpha, say so in a first line: x y z r g b a"
+        )
     finite = np.isfinite(values).all(axis=1)
     normals: FloatArray | None = None
     attributes: dict[str, npt.NDArray[Any]] = {}
@@ -218,12 +233,49 @@ def _further_columns(
         attributes["intensity" if at == 3 else f"column{at + 1}"] = values[:, at]
     for at in range(3 + single, columns, 3):
         three = values[:, at : at + 3]
-        length = np.linalg.norm(np.clip(three[finite], -2, 2), axis=1)  # clipped: no overflow
         colours = colours_of(three)
-        if normals is None and len(length) and (np.abs(length - 1) < 1e-3).all():
+        if normals is None and _are_unit(three[finite]):
             normals = three
-        elif "colours" not in attributes and colours is not None and colours.dtype != np.uint16:
+        elif (
+            "colours" not in attributes
+            and colours is not None
+            and (at + 3 == alpha or colours.dtype != np.uint16)
+        ):
             attributes["colours"] = colours
         else:
             attributes |= {f"column{at + k + 1}": three[:, k] for k in range(3)}
     return normals, attributes
+
+
+def _are_unit(vectors: FloatArray) -> bool:
+    """Whether there are vectors (n, 3), and all have length 1."""
+    length = np.linalg.norm(np.clip(vectors, -2, 2), axis=1)  # clipped: no overflow
+    return len(length) > 0 and bool((np.abs(length - 1) < 1e-3).all())
+
+
+def _are_four(values: FloatArray) -> bool:
+    """Whether columns 4 to 7 are taken as an intensity and a colour, and may be one with alpha."""
+    if values.shape[1] < 7 or (values.shape[1] - 3) % 3 != 1:
+        return False
+    colours = colours_of(values[:, 3:7])
+    return colours is not None and colours.dtype != np.uint16 and not _are_unit(values[:, 4:7])
+
+
+def _opaque(values: FloatArray) -> int | None:
+    """The column of an alpha that hides nothing, behind the first or the last colours; else None.
+
+    Where the two parts before it are no less throughout, it is the blue of white.
+    """
+    columns = values.shape[1]
+    if columns < 7 or (columns - 3) % 3 != 1:
+        return None
+    for at in (3, columns - 4):
+        four = values[:, at : at + 4]
+        colours = colours_of(four)
+        if colours is None or _are_unit(four[np.isfinite(four).all(axis=1), 1:]):
+            continue
+        most = 1 if colours.dtype.kind == "f" else np.iinfo(colours.dtype).max
+        full = (colours == most)[np.isfinite(colours).all(axis=1)]
+        if full[:, 3].all() and not full[:, 1:3].all():
+            return at + 3
+    return None

@@ -282,8 +282,8 @@ def xyz(data: bytes) -> Content:
     return content
 
 
-def _cloud(lines: list[bytes]) -> Content:
-    """The points in the lines of a text."""
+def _cloud(lines: list[bytes], *, has_intensity: bool = False) -> Content:
+    """The points in the lines of a text; see `Columns.content`."""
     _refuse_ptx(lines)
     start, headings = _head(lines)
     kept = _rows(lines[start:])
@@ -312,7 +312,7 @@ def _cloud(lines: list[bytes]) -> Content:
             values = table(rows, columns.axes)
         except ValueError:
             raise InputError(_fault(lines, start, rows, columns.axes)) from error
-    return columns.content(values)
+    return columns.content(values, has_intensity=has_intensity)
 
 
 def _head(lines: list[bytes]) -> tuple[int, list[Heading]]:
@@ -378,4 +378,4 @@ def pts(data: bytes) -> Content:
             if found != announced:
                 early = "ends early: " if found < announced else ""
                 raise InputError(f"{early}{announced} points are announced, {found} are there")
-    return _cloud(lines)
+    return _cloud(lines, has_intensity=True)

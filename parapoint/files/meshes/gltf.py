@@ -10,6 +10,7 @@ import json
 import logging
 import struct
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import unquote
@@ -178,6 +179,16 @@ class Gltf:
         item = self.tree["images"][index]
         file = item.get("uri", "data:")
         return str(item.get("name") or (f"image {index}" if file.startswith("data:") else file))
+
+    def files(self) -> list[Path]:
+        """The files beside it that hold its buffers and pictures, as far as they are there."""
+        found = []
+        for item in (*self.tree.get("buffers", []), *self.tree.get("images", [])):
+            uri = str(item.get("uri", "data:"))
+            if not uri.startswith("data:"):
+                with suppress(InputError):
+                    found.append(self._beside(uri))
+        return found
 
     def triangles(self, primitive: dict[str, Any]) -> IntArray:
         """(F, 3) rows of the vertices of a primitive of mode 4, 5 or 6."""
@@ -382,7 +393,20 @@ class Gltf:
             content.attributes["colours"] = vertices[:, 3:].astype(np.float32)
         if uvs:
             content.uv, content.uv_corners = np.concatenate(uvs), np.concatenate(uv_corners)
+        content.extras = self._extras(read)
         return content
+
+    def _extras(self, read: list[Placed]) -> tuple[str, ...]:
+        """What no mesh holds of the scene, in words."""
+        named = {"NORMAL": "normals", "TANGENT": "tangents", "JOINTS_0": "skins"}
+        held = {name for placed in read for name in placed.primitive["attributes"]}
+        of_vertices = held - {"POSITION", "COLOR_0", "TEXCOORD_0", "WEIGHTS_0"}
+        return (
+            *(named.get(name, name) for name in sorted(of_vertices)),
+            *(["morph targets"] if any("targets" in one.primitive for one in read) else []),
+            *(["objects"] if len(read) > 1 else []),
+            *(name for name in ("materials", "animations", "cameras") if self.tree.get(name)),
+        )
 
     def _points(self, placed_primitives: list[Placed]) -> Content:
         """The points of a scene without triangles, with their colours if some have any."""

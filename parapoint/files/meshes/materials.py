@@ -163,6 +163,17 @@ def _placed(colour: tuple[int, int, int], options: list[list[str]]) -> Material:
     return material
 
 
+def library_pictures(library: Path) -> list[Path]:
+    """The pictures that a material library names and that are there, of whatever kind."""
+    lines = [
+        line.strip().split(None, 1) for line in library_lines(library) if OF_PICTURE.match(line)
+    ]
+    named = [
+        named_file(library.parent, _picture_and_options(line[1])[0]) for line in lines if line[1:]
+    ]
+    return [path for path in named if path is not None]
+
+
 def _eight_bits(words: str) -> tuple[int, int, int]:
     """The colour of three words from 0 to 1, or of one for all; white where they are none."""
     try:

@@ -22,6 +22,21 @@ NO_SURFACE = tuple(
     word + blank for word in (b"l", b"surf", b"curv", b"curv2") for blank in (b" ", b"\t")
 )
 """Beginnings of lines of curves and free-form surfaces, which are not read."""
+NOT_SMOOTH = (b"s off", b"s 0")
+"""Lines that end a smoothing group and begin none."""
+EXTRAS = {
+    b"vn": "normals",
+    b"o": "objects",
+    b"g": "groups",
+    b"s": "smoothing groups",
+    b"usemtl": "materials",
+    b"l": "lines",
+    b"p": "points",
+    b"curv": "curves",
+    b"curv2": "curves",
+    b"surf": "free-form surfaces",
+}
+"""First words of lines whose content no mesh holds, and what that is called."""
 CONTINUED = re.compile(
     rb"\\[ \t]*(?:#[^\r\n]*)?(?:\r\n|\r|\n|\Z)([ \t]*(?:v[tnp]?|fo?|l|p|usemtl|mtllib)[ \t])?"
     rb"|#[^\r\n]*"
@@ -80,6 +95,8 @@ def obj(data: bytes) -> Content:
             backwards = indices < 0
             indices[backwards] = np.maximum(before[backwards] + indices[backwards] + 1, -1)
     content = Content(vertices, sizes, corners - 1, attributes=_colours(points, point_sizes))
+    words = {line.split(None, 1)[0] for line in lines if line and line not in NOT_SMOOTH}
+    content.extras = tuple(dict.fromkeys(name for word, name in EXTRAS.items() if word in words))
     if not has_faces:
         normals = [line[2:] for line in lines if line.startswith(VN)]
         content.normals = _normals(normals, len(vertices))

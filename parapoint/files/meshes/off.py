@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from parapoint.errors import InputError
 from parapoint.files.attributes import named_colours
-from parapoint.files.content import Content, floats, integers, plain_numbers, ranges
+from parapoint.files.content import FACE_COLOURS, Content, floats, integers, plain_numbers, ranges
 from parapoint.surfaces.surface import FloatArray
 
 logger = logging.getLogger("parapoint")
@@ -58,6 +58,10 @@ def off(data: bytes) -> Content:
         integers(chain.from_iterable(corners)),
         normals,
         attributes=attributes,
+        extras=(
+            *([FACE_COLOURS] if any(face[1 + int(face[0]) :] for face in faces) else []),
+            *(["old UVs"] if b"ST" in kind.upper() else []),
+        ),
     )
 
 
@@ -172,10 +176,12 @@ def _binary_off(body: bytes) -> Content:
             if faces is None:
                 continue
             starts, sizes = map(integers, faces)
+            has_colours = coloured and len(words) - start > sizes.sum() + 2 * face_count
             return Content(
                 words[3:start].view(f"{order}f4").astype(np.float64).reshape(-1, 3),
                 sizes,
                 words[start + ranges(starts, sizes)].astype(np.int64),
+                extras=(FACE_COLOURS,) if has_colours else (),
             )
     raise InputError("ends early, or its faces are not those of a binary OFF")
 

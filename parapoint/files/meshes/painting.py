@@ -22,7 +22,7 @@ from parapoint.files.meshes.pictures import (
     read_picture,
     readable,
 )
-from parapoint.files.meshes.ply import pictures_of
+from parapoint.files.meshes.ply import face_colours, pictures_of
 from parapoint.surfaces.surface import BoolArray, FloatArray, IntArray
 
 WRAPS: dict[int, Wrap] = {33648: "mirror", 33071: "clamp"}
@@ -97,6 +97,10 @@ def _obj(path: Path) -> tuple[tuple[Material, ...], IntArray]:
 
 def _ply(path: Path) -> tuple[tuple[Material, ...], IntArray]:
     names, number_of = pictures_of(path)
+    if not names and (colours := face_colours(path)) is not None:
+        distinct, of = np.unique(colours, axis=0, return_inverse=True)
+        flat = [(red, green, blue) for red, green, blue in distinct.tolist()]
+        return tuple(Material(colour) for colour in flat), of.reshape(-1)
     materials = []
     for name in names:
         found = named_file(path.parent, name)

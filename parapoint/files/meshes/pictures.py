@@ -124,9 +124,10 @@ def named_file(folder: Path, written: str) -> Path | None:
 
     It is looked for as it is written and as a bare name, with any kind of slashes, in upper and
     lower case, and in `folder` itself at last. Bytes of the name that are no UTF-8, as surrogates,
-    may also be Windows-1252.
+    may also be Windows-1252 or Latin-1.
     """
-    names = [written.strip(), bare_name(written)]
+    latin = written.encode(errors="surrogateescape").decode("latin-1")
+    names = [written.strip(), bare_name(written), latin.strip(), bare_name(latin)]
     with suppress(OSError):  # a name that is too long, a folder that may not be read
         for name in dict.fromkeys(names + [readable(name) for name in names]):
             path = Path(folder, name.replace("\\", "/"))

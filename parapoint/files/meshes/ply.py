@@ -16,8 +16,16 @@ import numpy as np
 import numpy.typing as npt
 
 from parapoint.errors import InputError
-from parapoint.files.attributes import GEOMETRY, named_attributes, taken_normals
+from parapoint.files.attributes import (
+    GEOMETRY,
+    named_attributes,
+    named_colours,
+    spelled_colours,
+    taken_normals,
+    unit_colours,
+)
 from parapoint.files.content import (
+    FACE_COLOURS,
     NO_UV,
     Content,
     points_content,
@@ -112,12 +120,6 @@ class Table:
 def opened(data: bytes) -> tuple[list[str], list[Table]]:
     """The comments of a PLY file, and its elements, whatever they are."""
     elements, body = _parts(data)
-    header = data.partition(b"end_header")[0].splitlines()
-    comments = [
-        line.partition(b" ")[2].decode(errors="surrogateescape")
-        for line in header
-        if line.startswith(b"comment ")
-    ]
     at = 0
     tables = []
     for name, count, properties in elements:
@@ -125,14 +127,26 @@ def opened(data: bytes) -> tuple[list[str], list[Table]]:
         pairs = zip(properties, columns, strict=True)
         tables.append(Table(name, count, {item.name: Column(*one) for item, one in pairs}))
     body.check_end(at)
-    return comments, tables
+    return comments_of(data), tables
+
+
+def comments_of(data: bytes) -> list[str]:
+    """The comments in the header of a PLY file."""
+    header = data.partition(b"end_header")[0].splitlines()
+    notes = [line.partition(b" ")[2] for line in header if line.startswith(b"comment ")]
+    return [line.decode(errors="surrogateescape") for line in notes]
+
+
+def named_pictures(data: bytes) -> list[str]:
+    """The pictures that a PLY file names, in order."""
+    comments = comments_of(data)
+    return [line.removeprefix(PICTURE).strip() for line in comments if line.startswith(PICTURE)]
 
 
 def pictures_of(path: Path) -> tuple[list[str], IntArray]:
     """The pictures that a PLY file names, and (N,) the number of the one on each polygon."""
     data = plain(path.read_bytes())
-    comments, tables = opened(data)
-    names = [line.removeprefix(PICTURE).strip() for line in comments if line.startswith(PICTURE)]
+    names, (_, tables) = named_pictures(data), opened(data)
     first, *others = (table for table in tables if table.name in POLYGONS and table.count)
     if not others and "texnumber" in first.columns:
         return names, first.columns["texnumber"].values.astype(np.int64)
@@ -248,7 +262,37 @@ def ply(data: bytes) -> Content:
     sizes, corners, uv_sizes, uv = (np.concatenate(part) for part in zip(*parts, strict=True))
     wedges = _ply_uv(columns, corners, sizes, uv_sizes, uv) if len(sizes) else (None, None)
     vertices, normals, attributes = _points_of(columns)
-    return Content(vertices, sizes, corners, normals, *wedges, attributes)
+    extras = _extras(elements)
+    return Content(vertices, sizes, corners, normals, *wedges, attributes, extras=extras)
+
+
+def _extras(elements: list[Element]) -> tuple[str, ...]:
+    """What no mesh holds of these elements, in words: properties of faces, and further elements."""
+    found = []
+    for name, count, properties in elements:
+        if name not in POLYGONS and name != "vertex" and count:
+            found.append(f"the element {name}")
+        elif name in POLYGONS and count:
+            left = [item.name for item in properties if item.name not in {*LISTS, "texnumber"}]
+            if colours := spelled_colours(left):
+                found.append(FACE_COLOURS)
+            found += [f"{name} of faces" for name in left if name not in colours]
+    return tuple(found)
+
+
+def face_colours(path: Path) -> npt.NDArray[np.uint8] | None:
+    """(N, 3) the colours of the faces of a PLY file; None where not all its polygons have one."""
+    tables = [one for one in opened(plain(path.read_bytes()))[1] if one.name in POLYGONS]
+    first, *others = (table for table in tables if table.count)
+    known = {name: of.values for name, of in first.columns.items() if of.sizes is None}
+    names = spelled_colours(list(known))
+    if others or not names:
+        return None
+    colours = named_colours(np.stack([known[name] for name in names], axis=1))
+    if colours is None:
+        return None
+    shares = np.nan_to_num(unit_colours(colours[:, :3]), nan=1.0)
+    return np.rint(255 * shares).astype(np.uint8)
 
 
 def _polygons(

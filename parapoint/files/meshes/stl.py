@@ -19,6 +19,7 @@ logger = logging.getLogger("parapoint")
 NAMED = re.compile(rb"^([ \t]*(?:end)?solid)\b.*", re.MULTILINE)
 """A line of a text STL that may end with the name of the solid, which may hold the words of the
 format."""
+SOLID = re.compile(rb"^[ \t]*solid\b", re.MULTILINE | re.IGNORECASE)
 HEADER = 84
 """Bytes before the triangles of a binary file; the last four are their number."""
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", 9), ("attribute", "<u2")])
@@ -34,7 +35,12 @@ def stl(data: bytes) -> Content:
         logger.warning("bytes behind the last triangle left out: %d", len(data) - size)
     soup = _text(data.lower()) if is_text else _binary(data, announced)
     vertices, corners = welded(soup.reshape(-1, 3))
-    return Content(vertices, np.full(len(corners) // 3, 3), corners)
+    content = Content(vertices, np.full(len(corners) // 3, 3), corners)
+    if not is_text and np.frombuffer(data, TRIANGLE, announced, HEADER)["attribute"].any():
+        content.extras = ("attributes of triangles",)
+    elif is_text and len(SOLID.findall(data)) > 1:
+        content.extras = ("solids",)
+    return content
 
 
 def _binary(data: bytes, announced: int) -> FloatArray:

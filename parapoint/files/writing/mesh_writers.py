@@ -61,7 +61,7 @@ def write_obj(
         *(f"f {a}/{ta} {b}/{tb} {c}/{tc}\n" for a, ta, b, tb, c, tc in corners.tolist()),
     ]
     with complete_file(path) as file:
-        file.write("".join(lines).encode())
+        file.write("".join(lines).encode(errors="surrogateescape"))
 
 
 def write_material(path: Path, texture: npt.NDArray[np.uint8], names: Iterable[str] = ()) -> str:
@@ -232,6 +232,6 @@ def write_ply(
     faces = np.zeros(len(split.faces), lists)
     faces["n"], faces["row"], faces["m"], faces["uv"] = 3, split.faces, 6, split.uv[split.faces]
     with complete_file(path) as file:
-        file.write("\n".join(header).encode())
+        file.write("\n".join(header).encode(errors="surrogateescape"))
         file.write(vertices.tobytes())
         file.write(faces.tobytes())

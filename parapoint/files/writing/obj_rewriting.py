@@ -87,7 +87,7 @@ def rewrite_obj(
     for triangle, place in enumerate(places.min(axis=1).tolist()):
         triangles_of.setdefault(place, []).append(triangle)
     starts = np.array(sorted(triangles_of))
-    made: list[bytes] = [] if material is None else [material.encode()]
+    made: list[bytes] = [] if material is None else [material.encode(errors="surrogateescape")]
     uv_lines = "".join(f"vt {u!r} {v!r}\n" for u, v in parameterization.uv.tolist()).encode()
     place = split = 0
     began = False

@@ -122,7 +122,6 @@ def _copies(vertex: IntArray, row: IntArray, count: int) -> tuple[IntArray, IntA
 
 def encoded(comments: list[str], tables: list[Table]) -> bytes:
     """A binary PLY file."""
-    begin = ["ply", "format binary_little_endian 1.0", *(f"comment {line}" for line in comments)]
     header = []
     for table in tables:
         header.append(f"element {table.name} {table.count}")
@@ -132,9 +131,10 @@ def encoded(comments: list[str], tables: list[Table]) -> bytes:
             header.append(
                 f"property {kind if column.sizes is None else f'list {size} {kind}'} {name}"
             )
-    text = "\n".join([*begin, ""]).encode(errors="surrogateescape")
-    text += "\n".join([*header, "end_header", ""]).encode("latin-1", errors="replace")
-    return text + b"".join(_table_bytes(table) for table in tables)
+    notes = "".join(f"comment {line}\n" for line in comments).encode(errors="surrogateescape")
+    text = "\n".join([*header, "end_header", ""]).encode("latin-1")
+    begin = b"ply\nformat binary_little_endian 1.0\n"
+    return begin + notes + text + b"".join(_table_bytes(table) for table in tables)
 
 
 def _table_bytes(table: Table) -> bytes:

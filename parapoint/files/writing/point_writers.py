@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, Any
@@ -14,6 +15,8 @@ from parapoint.files.attributes import COLOUR_COLUMNS, unit_colours
 from parapoint.files.targets import complete_file
 from parapoint.surfaces.parameterization import PointParameterization
 from parapoint.surfaces.surface import FloatArray, PointCloud
+
+logger = logging.getLogger("parapoint")
 
 ROWS_WRITTEN = 65_536
 """Points written at a time, which bounds the memory that their text takes beside them."""
@@ -114,6 +117,8 @@ def _ply(file: IO[bytes], cloud: PointCloud, uv: FloatArray) -> None:
 def _obj(file: IO[bytes], cloud: PointCloud, uv: FloatArray) -> None:
     """OBJ without faces: row k of v, vn and vt is point k, white where it has no colour."""
     columns = {"v": cloud.points, "vn": cloud.normals, "vt": uv}
+    if left := [name for name in _known(cloud) if name != "colours"]:
+        logger.warning("OBJ has no room for: %s; a .ply or .npz file keeps them", ", ".join(left))
     colours = cloud.attributes.get("colours")
     if colours is not None:
         columns["v"] = np.concatenate(

@@ -4,6 +4,7 @@ import base64
 import errno
 import json
 import logging
+import os
 import struct
 import tracemalloc
 from pathlib import Path
@@ -15,10 +16,13 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from parapoint import InputError, Mesh, Parameterization, PointCloud
+from parapoint.commands.given_seams import read_seams
+from parapoint.files.pieces import point_pieces
 from parapoint.files.reading import FORMATS, has_faces, read_parameterized, read_surface
 from parapoint.files.writing import point_writers
 from parapoint.files.writing.mesh_writers import write_obj
 from parapoint.files.writing.point_writers import write_points
+from parapoint.testing import irregular_disk
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
 TRIANGLES = [[0, 1, 2], [0, 2, 3]]
@@ -753,3 +757,17 @@ def test_points_are_written_in_bounded_memory(ending, tmp_path, monkeypatch) -> 
 @pytest.mark.parametrize(("text", "expected"), [("v 0 0 0\nf 1 1 1\n", True), ("v 0 0 0\n", False)])
 def test_a_file_is_known_to_have_faces(text: str, expected: bool, tmp_path: Path) -> None:
     assert has_faces(saved(tmp_path, "a.obj", text)) is expected
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows has no named pipes")
+@pytest.mark.parametrize("name", ["-", "pipe.obj", "pipe", "/dev/null"])
+def test_pipes_and_devices_are_refused(name: str, tmp_path: Path) -> None:
+    """At once: a command would wait for one for ever, or read it once where it reads twice."""
+    path = tmp_path / name
+    if name.startswith("pipe"):
+        os.mkfifo(path)
+    path = Path(name) if name == "-" else path
+    readers = (read_surface, read_parameterized, lambda of: list(point_pieces(of)))
+    for reader in (*readers, lambda of: read_seams(str(of), irregular_disk())):
+        with pytest.raises(InputError, match=f"{name}: pipes and devices are not read; write to"):
+            reader(path)

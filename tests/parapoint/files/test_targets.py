@@ -11,6 +11,7 @@ from PIL import Image
 from parapoint.errors import InputError
 from parapoint.files.targets import (
     beside,
+    checked_picture,
     checked_target,
     complete_file,
     is_ours,
@@ -94,6 +95,74 @@ def test_an_input_beside_the_output_is_never_replaced(tmp_path: Path) -> None:
     (tmp_path / "out.mtl").write_bytes(sealed_text(""))
     with pytest.raises(InputError, match="is the input"):
         checked_target(tmp_path / "out.obj", sides=SIDES, inputs=[tmp_path / "out.mtl"])
+
+
+MODELS = {
+    "obj": ("in.obj", b"mtllib it.mtl\nv 0 0 0\n"),
+    "ply": ("in.ply", b"ply\nformat ascii 1.0\ncomment TextureFile it.png\nend_header\n"),
+    "gltf": ("in.gltf", b'{"meshes": [{}], "images": [{"uri": "it.png"}]}'),
+}
+"""Models, each by its name and bytes, that name a picture."""
+
+
+@pytest.mark.parametrize("kind", MODELS)
+def test_what_an_input_names_is_never_replaced(tmp_path: Path, kind: str) -> None:
+    """As a picture, and beside a mesh, even where it carries our seal."""
+    name, data = MODELS[kind]
+    (tmp_path / name).write_bytes(data)
+    (tmp_path / "it.mtl").write_bytes(sealed_text("newmtl a\nmap_Bump -bm 0.5 it.png\n"))
+    (tmp_path / "it.png").write_bytes(sealed_png(png()))
+    inputs = [tmp_path / name]
+    for checked in (
+        lambda **of: checked_picture(tmp_path / "it.png", inputs=inputs, **of),
+        lambda **of: checked_target(tmp_path / "it.glb", sides=(".png",), inputs=inputs, **of),
+    ):
+        with pytest.raises(InputError, match=rf"it\.png: is named by .*{name}"):
+            checked()
+        checked(force=True)
+    checked_picture(tmp_path / "it.png", inputs=[tmp_path / "it.png.xyz"])
+
+
+def test_a_picture_beside_the_output_replaces_one_of_ours_alone(tmp_path: Path) -> None:
+    """One that `--out` itself names replaces any."""
+    path = tmp_path / "seen.png"
+    for data in (b"of the user", sealed_png(png())):
+        path.write_bytes(data)
+        checked_picture(path)
+        checked_picture(path, is_side=True, force=True)
+        if data != b"of the user":
+            checked_picture(path, is_side=True)
+            continue
+        with pytest.raises(InputError, match=r"seen\.png: is a file of yours"):
+            checked_picture(path, is_side=True)
+
+
+@pytest.mark.parametrize("force", [False, True])
+@pytest.mark.parametrize("name", ["out.obj", "out.mtl"])
+def test_a_write_protected_file_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, force: bool
+) -> None:
+    """Also with --force; root, who may write everything, sees what others do."""
+    (tmp_path / name).write_bytes(sealed_text(""))
+    (tmp_path / name).chmod(0o444)
+    monkeypatch.setattr(os, "access", lambda path, _: bool(path.stat().st_mode & 0o200))
+    with pytest.raises(InputError, match=rf"{name}: is write-protected"):
+        checked_target(tmp_path / "out.obj", sides=SIDES, force=force)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no such modes")
+def test_a_file_that_is_replaced_keeps_its_mode(tmp_path: Path) -> None:
+    """A new one gets that of all new files."""
+    for name, mode in (("kept", 0o640), ("new", None)):
+        path = tmp_path / name
+        if mode is not None:
+            path.touch()
+            path.chmod(mode)
+        with complete_file(path) as file:
+            file.write(b"v")
+        (tmp_path / "other").touch()
+        expected = mode or (tmp_path / "other").stat().st_mode & 0o777
+        assert path.stat().st_mode & 0o777 == expected
 
 
 def test_a_link_is_followed_and_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

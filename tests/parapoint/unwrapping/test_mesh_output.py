@@ -1,5 +1,6 @@
 """What `unwrap` writes of a mesh keeps what the file says of it, and shows what it showed."""
 
+import base64
 import io
 import json
 import struct
@@ -87,6 +88,121 @@ def seen(path, picture, points):
     face = ((points[:, None] - middles[None]) ** 2).sum(axis=2).argmin(axis=1)
     height, width = picture.shape[:2]
     return picture[((1 - at[face, 1]) * height).astype(int), (at[face, 0] * width).astype(int), :3]
+
+
+TRIANGLE = {
+    "all.obj": (
+        (
+            "mtllib no.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\no a\ng b\ns 1\nusemtl m\n"
+            "f 1/1/1 2/1/1 3/1/1\nl 1 2\np 1\n"
+        ),
+        "old UVs, normals, objects, groups, smoothing groups, materials, lines, points",
+    ),
+    "plain.obj": ("s off\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", ""),
+    "all.ply": (
+        (
+            "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+            "property float z\nproperty float nx\nproperty float ny\nproperty float nz\n"
+            "property float quality\nelement face 1\nproperty list uchar int vertex_indices\n"
+            "property list uchar int tags\nproperty uchar red\nproperty uchar green\n"
+            "property uchar blue\nproperty uchar flags\nelement edge 1\nproperty int vertex1\n"
+            "property int vertex2\nend_header\n0 0 0 0 0 1 5\n1 0 0 0 0 1 5\n0 1 0 0 0 1 5\n"
+            "3 0 1 2 1 7 1 2 3 4\n0 1\n"
+        ),
+        "normals, quality, colours of faces, tags of faces, flags of faces, the element edge",
+    ),
+    "all.off": (
+        "STOFF\n3 1 0\n0 0 0 0 0\n1 0 0 0 0\n0 1 0 0 0\n3 0 1 2 9 9 9\n",
+        "colours of faces, old UVs",
+    ),
+    "all.stl": (
+        2
+        * (
+            "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+            "endloop\nendfacet\nendsolid a\n"
+        ),
+        "solids",
+    ),
+}
+"""Files of one triangle, and what they hold beside it."""
+
+
+@pytest.mark.parametrize("name", TRIANGLE)
+def test_what_a_file_holds_beside_its_mesh_is_known(name, tmp_path) -> None:
+    text, extras = TRIANGLE[name]
+    (tmp_path / name).write_text(text)
+    assert ", ".join(read_polygons(tmp_path / name).extras) == extras
+
+
+def test_what_other_files_hold_beside_their_mesh_is_known(tmp_path) -> None:
+    """Of binary STL, NPZ and glTF."""
+    points, faces = np.eye(3, dtype=np.float32), np.array([[0, 1, 2]])
+    facet = np.zeros(3, "f4").tobytes() + points.tobytes() + b"\1\0"
+    (tmp_path / "a.stl").write_bytes(b"\0" * 80 + struct.pack("<I", 1) + facet)
+    np.savez(tmp_path / "a.npz", vertices=points, faces=faces, normals=points, quality=points[0])
+    data = base64.b64encode(points.tobytes()).decode()
+    names = ("POSITION", "NORMAL", "TEXCOORD_1", "_ID")
+    primitive = {"attributes": dict.fromkeys(names, 0), "material": 0}
+    tree = {
+        "buffers": [{"uri": f"data:,{data}", "byteLength": 36}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 3}],
+        "materials": [{}],
+        "cameras": [{}],
+        "meshes": [{"primitives": [primitive, primitive]}],
+    }
+    (tmp_path / "a.gltf").write_text(json.dumps(tree))
+    found = {path.suffix: read_polygons(path).extras for path in tmp_path.iterdir()}
+    assert found == {
+        ".stl": ("attributes of triangles",),
+        ".npz": ("normals", "quality"),
+        ".gltf": ("normals", "TEXCOORD_1", "_ID", "objects", "materials", "cameras"),
+    }
+
+
+@pytest.mark.parametrize("ending", [".ply", ".obj", ".glb", ".npz"])
+def test_colours_of_faces_are_painted_or_said_to_be_left_out(
+    ending, tmp_path, caplog, monkeypatch
+) -> None:
+    """Flat, one to a face; a PLY file keeps them as they were, without a picture."""
+    points, quads = grid()
+    colours = np.random.default_rng(0).integers(0, 256, (len(quads), 3))
+    header = ["ply", "format ascii 1.0", f"element vertex {len(points)}"]
+    header += [f"property float {axis}" for axis in "xyz"]
+    header += [f"element face {len(quads)}", "property list uchar int vertex_indices"]
+    header += [*(f"property uchar {of}" for of in ("red", "green", "blue")), "end_header"]
+    rows = [" ".join(map(str, point)) for point in points.tolist()]
+    pairs = zip(quads, colours.tolist(), strict=True)
+    rows += [" ".join(map(str, (4, *quad, *of))) for quad, of in pairs]
+    source, out = tmp_path / "faces.ply", tmp_path / f"new{ending}"
+    source.write_text("\n".join([*header, *rows, ""]))
+    monkeypatch.setattr("parapoint.commands.mesh_output.TEXTURE", 256)
+    written(source, out, None)
+    assert ("colours of faces" in caplog.text) == (ending == ".npz")
+    assert (tmp_path / "new.png").exists() == (ending == ".obj")
+    if ending == ".glb":
+        (tmp_path / "new.png").write_bytes(opened(out).image(0))
+    if ending in {".obj", ".glb"}:
+        shown = seen(out, np.asarray(Image.open(tmp_path / "new.png")), middles(source))
+        assert np.array_equal(shown, colours[read_polygons(source).polygon_of])
+
+
+@pytest.mark.parametrize("ending", [".ply", ".obj", ".glb"])
+def test_colours_of_vertices_beneath_a_texture_are_said_to_be_left_out(
+    ending, tmp_path, caplog
+) -> None:
+    """The texture is what the file shows; strips are no faces that can be written again."""
+    Image.fromarray(old_picture()).save(tmp_path / "old.png")
+    header = ["ply", "format ascii 1.0", "comment TextureFile old.png", "element vertex 4"]
+    header += [f"property float {name}" for name in "xyzst"]
+    header += [f"property uchar {name}" for name in ("red", "green", "blue")]
+    header += ["element tristrips 1", "property list int int vertex_indices", "end_header"]
+    rows = ["0 0 0 0 0 1 2 3", "1 0 0 1 0 4 5 6", "0 1 0 0 1 7 8 9", "1 1 0 1 1 1 2 3"]
+    source = tmp_path / "strips.ply"
+    source.write_text("\n".join([*header, *rows, "4 0 1 2 3", ""]))
+    written(source, tmp_path / f"new{ending}")
+    assert "what it shows in a texture; left out: colours" in caplog.text
+    assert "would keep them" not in caplog.text
 
 
 def middles(path) -> np.ndarray:

@@ -10,11 +10,13 @@ import pytest
 from numpy.testing import assert_allclose
 from PIL import Image
 
-from parapoint import cli, clock
+from parapoint import InputError, cli, clock
+from parapoint.commands.given_seams import read_seams
 from parapoint.commands.telling import ADVICE_OF_MESHES, warn
 from parapoint.commands.unwrapping import Request, _advice, _one_each, _warn_of_bound, expected
 from parapoint.files.meshes.gltf import opened
 from parapoint.files.reading import read_parameterized, read_surface
+from parapoint.files.writing.mesh_writers import write_npz
 from parapoint.surfaces.areas import LEAST_PART, MOST_STARVED
 from parapoint.surfaces.parameterization import Charted, Parameterization
 from parapoint.surfaces.surface import Mesh
@@ -163,8 +165,8 @@ def test_the_seams_of_a_map_are_followed(box, tmp_path, capsys) -> None:
 
 def test_a_map_of_another_surface_has_no_seams_for_this_one(box, tmp_path, capsys) -> None:
     unfold(box, tmp_path / "net.obj", capsys)
-    finer = BOX.replace("v 0 0 0 1 0 0", "v 0 0 9")
-    (tmp_path / "other.obj").write_text(finer)
+    open_box = BOX.replace("f 1 2 6 5\n", "").replace("f 4 1 5 8\n", "")
+    (tmp_path / "other.obj").write_text(open_box)
     seams = ["--seams", tmp_path / "net.obj"]
     status, _, err = run(
         ["unwrap", tmp_path / "other.obj", "--out", tmp_path / "a.obj", *seams], capsys
@@ -176,6 +178,28 @@ def test_a_map_of_another_surface_has_no_seams_for_this_one(box, tmp_path, capsy
     assert status == 2
     assert "have no UV; each must have one" in err
     assert not (tmp_path / "a.obj").exists()
+
+
+@pytest.mark.parametrize("scale", [1000, 1.1, 0.5])
+def test_seams_of_a_map_lie_on_the_mesh(scale, box, tmp_path) -> None:
+    """Nearest vertices of a mesh of another size may have the same edges, and mean nothing."""
+    mesh = read_surface(box)
+    uv = np.arange(72.0).reshape(36, 2)
+    corners = np.arange(36).reshape(12, 3)
+    charted = Charted(Mesh(scale * mesh.vertices, mesh.faces), Parameterization(uv, corners))
+    write_npz(tmp_path / "far.npz", charted)
+    with pytest.raises(InputError, match=r"far\.npz: has a seam that is .* off the vertices"):
+        read_seams(str(tmp_path / "far.npz"), mesh)
+    write_npz(tmp_path / "near.npz", charted._replace(mesh=Mesh(1.001 * mesh.vertices, mesh.faces)))
+    assert len(read_seams(str(tmp_path / "near.npz"), mesh)) == 18
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-32"])
+def test_seams_are_read_in_any_encoding(encoding, box) -> None:
+    """As other texts are."""
+    path = box.parent / "net.txt"
+    path.write_text(NET, encoding=encoding)
+    assert read_seams(str(path), read_surface(box))[0].tolist() == [0, 1]
 
 
 def test_the_file_of_seams_is_not_replaced(box, tmp_path, capsys) -> None:
@@ -258,7 +282,9 @@ def test_a_texture_that_an_obj_file_has_no_use_for_is_said(box, tmp_path, capsys
 
 def test_other_formats(box, tmp_path, capsys, caplog) -> None:
     unfold(box, tmp_path / "out.npz", capsys)
-    assert "left out: old UVs, polygons. A .obj file would keep them" in caplog.text
+    assert (
+        "left out: old UVs, polygons, normals, objects, groups, materials, lines. A" in caplog.text
+    )
     with np.load(tmp_path / "out.npz") as held:
         assert held["vertices"].shape == (8, 3)
         assert held["uv"].shape == (14, 2)
@@ -330,7 +356,7 @@ def test_the_margin_is_in_texels_of_the_texture_that_is_written(
     ("seams", "more", "message"),
     [
         ("1 7\n", [], "line 1 is no edge of the mesh"),
-        ("1 2\n0 1\n", [], "line 2 is no edge of the mesh"),
+        ("1 2\n0 1\n", [], "line 2 is no edge of the mesh; numbers count from 1"),
         ("2 99\n", [], "line 1 is no edge of the mesh"),
         ("1 2 3\n", [], "line 1 is not two vertex numbers"),
         ("# none\n", [], "has no edge"),
@@ -508,14 +534,17 @@ def test_a_distortion_does_not_go_with_seams_that_are_given(box, tmp_path, capsy
 
 
 @pytest.mark.parametrize(
-    ("method", "seconds"),
+    ("method", "faces", "seconds"),
     [
-        (Unwrap(), 70.0),
-        (Unwrap(time_budget=20.0), 20.0),
-        (Unwrap(time_budget=90.0), 70.0),
-        (Unwrap(max_distortion=4.1), None),
-        (Unwrap(max_distortion=4.1, time_budget=90.0), 90.0),
+        (Unwrap(), [100_000], 70.07),
+        (Unwrap(), 500 * [4], 35.2),
+        (Unwrap(time_budget=20.0), [100_000], 20.0),
+        (Unwrap(time_budget=90.0), [100_000], 70.07),
+        (Unwrap(max_distortion=4.1), [100_000], None),
+        (Unwrap(max_distortion=4.1, time_budget=90.0), [100_000], 90.0),
     ],
 )
-def test_what_unwrapping_should_take_is_told(method, seconds) -> None:
-    assert expected(method, 100_000) == (seconds and pytest.approx(seconds, rel=1e-6))
+def test_what_unwrapping_should_take_is_told(method, faces, seconds) -> None:
+    """By the faces of each component, and for each component."""
+    told = expected(method, np.array(faces))
+    assert told == (seconds and pytest.approx(seconds, rel=1e-3))

@@ -82,3 +82,40 @@ def test_fractions_above_1_are_no_colours():
     assert colours_of(np.array([[2.0, 255.0, 0.0]])).dtype == np.uint8
     assert colours_of(np.array([[0.5, 1.5, 0.0]])) is None
     assert colours_of(np.array([[2.0, 70_000.0, 0.0]])) is None
+
+
+EIGHT = np.array([[9, 0, 8], [255, 7, 0], [1, 2, 3], [40, 50, 60]])
+UPWARD = np.array([[0, 0, 1]] * 4)
+WHITE = np.full((4, 3), 255)
+
+
+@pytest.mark.parametrize(
+    ("parts", "held", "warns"),
+    [
+        ((EIGHT, 255), {"colours": EIGHT}, False),
+        ((EIGHT / 255, 1), {"colours": EIGHT / 255}, False),
+        ((257 * EIGHT, 65535), {"colours": 257 * EIGHT}, False),
+        ((UPWARD, EIGHT, 255), {"normals": UPWARD, "colours": EIGHT}, False),
+        ((EIGHT, 255, UPWARD), {"normals": UPWARD, "colours": EIGHT}, False),
+        ((0.5, UPWARD), {"intensity": 0.5, "normals": UPWARD}, False),
+        ((300, EIGHT), {"intensity": 300, "colours": EIGHT}, False),
+        ((7, EIGHT), {"intensity": 7, "colours": EIGHT}, True),
+        ((7, WHITE), {"intensity": 7, "colours": WHITE}, True),
+    ],
+)
+def test_four_columns_are_a_colour_and_its_alpha_or_an_intensity_and_a_colour(
+    tmp_path, caplog, parts, held, warns
+) -> None:
+    """The last column tells; where it does not, a warning does; in PTS the rule does."""
+    columns = [part if np.ndim(part) else np.full((4, 1), part) for part in parts]
+    rows = np.hstack([PLACES, *columns]).tolist()
+    text = "".join(" ".join(map(repr, row)) + "\n" for row in rows)
+    cloud = read(tmp_path / "a.xyz", text)
+    found = cloud.attributes | ({} if cloud.normals is None else {"normals": cloud.normals})
+    assert found.keys() == held.keys()
+    for name, values in held.items():
+        assert_allclose(found[name], np.broadcast_to(values, found[name].shape), rtol=1e-12)
+    assert ("taken as intensity" in caplog.text) == warns
+    caplog.clear()
+    assert "intensity" in read(tmp_path / "a.pts", text).attributes
+    assert not caplog.text

@@ -12,7 +12,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from parapoint.errors import InputError
 from parapoint.files.reading import read_surface
-from parapoint.surfaces.surface import FloatArray, Mesh
+from parapoint.files.writing.point_writers import write_points
+from parapoint.surfaces.surface import FloatArray, Mesh, PointCloud
 
 POINTS = [[1.5, 2.25, -3], [4, 5.5, 6]]
 SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
@@ -186,3 +187,13 @@ def test_gltf_skins_and_morph_targets_are_posed(tmp_path: Path) -> None:
     mesh = read_surface(path)
     assert isinstance(mesh, Mesh)
     assert_array_equal(mesh.vertices, [[0, 0, 1], [2, 0, 1], [0, 5, 1]])
+
+
+def test_what_an_obj_file_of_points_has_no_room_for_is_said(tmp_path, caplog) -> None:
+    """All but colours; other formats keep it."""
+    colours, echo = np.zeros((2, 3), dtype=np.uint8), np.ones(2)
+    cloud = PointCloud(np.eye(3)[:2], attributes={"colours": colours, "intensity": echo})
+    for ending in (".npz", ".ply", ".obj"):
+        write_points(tmp_path / f"out{ending}", cloud, np.zeros((2, 2)))
+        said = "OBJ has no room for: intensity; a .ply or .npz file keeps them"
+        assert caplog.messages == [said] * (ending == ".obj")
