@@ -242,7 +242,10 @@ def test_a_cloud_without_colours_gets_a_checkerboard(model, bowl, tmp_path) -> N
 
 
 @pytest.mark.parametrize("ending", [".glb", ".npz"])
-def test_a_preview_shows_the_surface_beside_its_layout(ending, model, bowl, tmp_path) -> None:
+def test_a_preview_shows_the_surface_beside_its_layout(
+    ending, model, bowl, tmp_path, monkeypatch
+) -> None:
+    monkeypatch.setattr("parapoint.textures.preview.SAMPLES", 200_000)
     write(model, bowl, str(tmp_path / f"a{ending}"), texture=64, preview=tmp_path / "p.png")
     picture = np.asarray(Image.open(tmp_path / "p.png"))
     assert picture.shape == (SIDE, 3 * SIDE, 3)
