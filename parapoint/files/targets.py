@@ -146,7 +146,7 @@ def _check_inputs_stay(files: list[Path], inputs: list[Path]) -> None:
         for file in there:
             if any(file.samefile(one) for one in named):
                 raise InputError(
-                    f"{file}: is named by {path}, so it is not replaced; take another name"
+                    f"{file}: is named by {path}, so it stays; take another name, or --force"
                 )
 
 
