@@ -22,6 +22,7 @@ COLOUR_COLUMNS = (
     ("red", "green", "blue"),
     ("diffuse_red", "diffuse_green", "diffuse_blue"),
     ("r", "g", "b"),
+    ("rf", "gf", "bf"),
 )
 """Names under which the parts of a colour stand, in lower case."""
 BRIGHT = 16

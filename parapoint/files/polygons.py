@@ -30,7 +30,8 @@ def triangle_rows(vertices: FloatArray, sizes: IntArray, corners: IntArray) -> I
 
     A polygon of n corners gives n - 2 triangles, a fan from its first corner. A quad that would
     fold along that diagonal (the two triangles face away from each other) is fanned from its
-    second corner, which is right for every planar quad. A larger polygon whose fan would fold, or
+    second corner, which is right for every planar quad; quads of the same corners, as the two sides
+    of a sheet are, get the same diagonal. A larger polygon whose fan would fold, or
     have a triangle without area, is cut by ears in its mean plane (mapbox/earcut), which is right
     for every planar polygon, with a bridge to a hole as well.
 
@@ -49,7 +50,8 @@ def triangle_rows(vertices: FloatArray, sizes: IntArray, corners: IntArray) -> I
     if len(quads):
         a, b, c, d = (vertices[corners[starts[quads] + k]] / scale for k in range(4))
         first, second = np.cross(b - a, c - a), np.cross(c - a, d - a)
-        turn[quads] = (first * second).sum(axis=1) < 0
+        folds = (first * second).sum(axis=1) < 0
+        turn[quads] = _cut_alike(corners[starts[quads, None] + np.arange(4)], folds)
     count = sizes - 2
     step = ranges(np.ones_like(count), count)
     place = np.stack([np.zeros_like(step), step, step + 1], axis=1)
@@ -67,6 +69,21 @@ def triangle_rows(vertices: FloatArray, sizes: IntArray, corners: IntArray) -> I
         places = first_row[polygons[cut], None] + np.arange(n - 2)
         rows[places] = starts[polygons[cut], None, None] + triangles
     return rows
+
+
+def _cut_alike(quads: IntArray, folds: BoolArray) -> IntArray:
+    """(N,) the corner, 0 or 1, at which the diagonal of each quad (N, 4) begins.
+
+    It is 1 where the quad `folds` (N,) along the other one. Of quads with the same corners the
+    first decides.
+    """
+    _, first, number = np.unique(
+        np.sort(quads, axis=1), axis=0, return_index=True, return_inverse=True
+    )
+    leader, turn = first[number.reshape(-1)], folds.astype(np.int64)
+    apex = quads[leader, turn[leader]]
+    alike = (quads[:, 1] == apex) | (quads[:, 3] == apex)
+    return np.where(leader == np.arange(len(quads)), turn, alike)
 
 
 def corner_rows(places: IntArray, rows: IntArray) -> tuple[IntArray, BoolArray]:

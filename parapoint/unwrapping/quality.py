@@ -87,7 +87,7 @@ def quality(placed: Charted, texture: int) -> Quality:
     space = mesh.vertices[mesh.faces[solid]]
     corners = held.corners[solid]
     plane = np.pad(held.uv[corners], ((0, 0), (0, 0), (0, 1)))
-    is_turned = turned_faces(corners)  # against its neighbours, in the mesh as in the map
+    is_turned = _turned(corners)  # against its neighbours, in the mesh as in the map
     area, signed = _normals(space), _normals(plane)[:, 2] / 2 * np.where(is_turned, -1, 1)
     area = np.linalg.norm(area, axis=1) / 2
     ratio = (np.abs(signed) / np.abs(signed).sum()) / (area / area.sum())
@@ -126,6 +126,16 @@ def quality(placed: Charted, texture: int) -> Quality:
         filled=filled,
         texels_per_unit=texture * float(np.sqrt(np.abs(signed).sum() / area.sum())),
     )
+
+
+def _turned(corners: IntArray) -> BoolArray:
+    """(F,) the faces that turn against their neighbours; a copy of a face is none of these."""
+    least = (corners.argmin(axis=1)[:, None] + np.arange(3)) % 3
+    alike = np.take_along_axis(corners, least, axis=1)
+    _, first, number = np.unique(alike, axis=0, return_index=True, return_inverse=True)
+    single = np.sort(first)
+    turned = turned_faces(corners[single])
+    return np.asarray(turned[np.searchsorted(single, first)][number.reshape(-1)])
 
 
 def _overlap(uv: FloatArray, corners: IntArray) -> str:

@@ -149,16 +149,16 @@ def _image(path: Path, scene: Gltf, index: int) -> Picture | None:
 def _with_alpha(picture: Picture, material: dict[str, Any], share: float) -> Picture:
     """A picture with the alpha that a glTF material shows, which is `share` of its own.
 
-    Where the material is cut out, the alpha of its edge becomes a half.
+    Where the material is cut out, all is opaque or not there.
     """
     mode, edge = material.get("alphaMode", "OPAQUE"), material.get("alphaCutoff", 0.5)
-    if mode == "OPAQUE" or (mode == "MASK" and edge <= 0):
+    if mode == "OPAQUE":
         return picture[..., :3]
-    if mode == "MASK":
-        share *= 0.5 / edge
     own = picture[..., 3] if picture.shape[2] == 4 else np.full(picture.shape[:2], 255)
-    alpha = np.rint(np.clip(own * share, 0, 255))
-    return np.dstack([picture[..., :3], alpha.astype(np.uint8)])
+    alpha = np.clip(own * share, 0, 255)
+    if mode == "MASK":
+        alpha = np.where(alpha >= 255 * edge, 255, 0)
+    return np.dstack([picture[..., :3], np.rint(alpha).astype(np.uint8)])
 
 
 def _wraps(tree: dict[str, Any], texture: dict[str, Any]) -> tuple[Wrap, Wrap]:

@@ -79,3 +79,14 @@ def test_corners_inside_straight_edges_keep_their_triangles():
     assert set(rows.ravel().tolist()) == set(range(9))
     assert (doubled >= 0).all()
     assert_allclose(doubled.sum() / 2, 10.0)
+
+
+@pytest.mark.parametrize("shift", range(4))
+@pytest.mark.parametrize("turn", [1, -1])
+def test_quads_of_the_same_corners_are_cut_along_the_same_diagonal(shift: int, turn: int) -> None:
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0.2], [0, 1, 0]])
+    quads = np.stack([np.arange(4), np.roll(np.arange(4)[::turn], shift)])
+    corners = quads.reshape(-1)
+    triangles = np.sort(corners[triangle_rows(square, np.array([4, 4]), corners)], axis=1)
+    one, other = (set(map(tuple, half.tolist())) for half in np.split(triangles, 2))
+    assert one == other == {(0, 1, 2), (0, 2, 3)}

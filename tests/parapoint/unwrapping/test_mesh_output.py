@@ -556,8 +556,9 @@ def test_what_an_obj_lets_through_stays(kind, textured, tmp_path, caplog) -> Non
     [
         ({}, None),
         ({"alphaMode": "BLEND"}, 60),
-        ({"alphaMode": "MASK"}, 60),
-        ({"alphaMode": "MASK", "alphaCutoff": 0.25}, 120),
+        ({"alphaMode": "MASK"}, 0),
+        ({"alphaMode": "MASK", "alphaCutoff": 0.25}, 0),
+        ({"alphaMode": "MASK", "alphaCutoff": 0.2}, None),
         ({"alphaMode": "MASK", "alphaCutoff": 0}, None),
         ({"alphaMode": "BLEND", "factor": [1, 1, 1, 0.5]}, 30),
     ],
@@ -574,6 +575,8 @@ def test_what_a_gltf_lets_through_stays(material, alpha, tmp_path) -> None:
     picture = np.asarray(Image.open(tmp_path / "new.png"))
     assert picture.shape[2] == (3 if alpha is None else 4)
     assert alpha is None or picture[..., 3].min() == alpha
+    if alpha == 0:  # cut out, but for the texels at the very edges
+        assert np.isin(picture[..., 3:], [0, 255]).mean() > 0.8
     library = (tmp_path / "new.mtl").read_text()
     assert ("map_Kd new.png\nmap_d new.png\n" in library) == (alpha is not None)
 

@@ -293,6 +293,14 @@ def test_other_formats(box, tmp_path, capsys, caplog) -> None:
     assert len(read_surface(tmp_path / "out.glb").faces) == 12
 
 
+def test_a_copy_of_a_face_is_not_flipped(tmp_path, capsys) -> None:
+    path = tmp_path / "twice.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\nf 2 3 1\n")
+    status, out, _ = run(["unwrap", path, "--out", tmp_path / "a.obj", "--json"], capsys)
+    facts = json.loads(out)
+    assert (status, facts["flipped"], facts["overlap"]) == (0, 0, "unknown")
+
+
 @pytest.mark.parametrize("faces", ["f 1 2 3", "f 1 2 3\nf 1 3 4", "f 1 2 3 4"])
 def test_the_two_sides_of_a_sheet_keep_their_own_colours(faces, tmp_path, capsys, caplog) -> None:
     """A leaf: each face twice, wound the other way, with a material of its own."""

@@ -284,3 +284,10 @@ def test_numbers_are_read_as_meant_or_refused(between: str, point: str) -> None:
 def test_a_text_cloud_may_have_any_of_its_endings(tmp_path: Path, ending: str) -> None:
     cloud = cloud_of(tmp_path, "id,x,y,z\n7,1,2,3\n9,4,5,6\n", ending)
     assert_array_equal(cloud.points, [[1, 2, 3], [4, 5, 6]])
+
+
+@pytest.mark.parametrize("names", ["Rf Gf Bf", "R G B", "red green blue"])
+def test_fractions_under_the_names_of_colours_are_colours(tmp_path: Path, names: str) -> None:
+    """CloudCompare writes the first."""
+    cloud = cloud_of(tmp_path, f"//X Y Z {names}\n1.5 2.25 -3 1 0.5 0\n4 5.5 6 0.25 0 1\n")
+    assert_allclose(cloud.attributes["colours"], [[1, 0.5, 0], [0.25, 0, 1]])
