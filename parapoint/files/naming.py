@@ -17,7 +17,7 @@ from parapoint.files.reading import UNREADABLE
 def files_named_in(model: Path) -> list[Path]:
     """The material libraries, pictures and buffers that a model names and that are there.
 
-    None where the model cannot be read; whoever reads it says so.
+    The list is empty where the model cannot be read; whoever reads it says so.
     """
     of: dict[str, Callable[[Path], list[Path]]] = {
         ".obj": _of_obj,
