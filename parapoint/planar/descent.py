@@ -18,6 +18,7 @@ from parapoint.planar.scaffold import (
     of_area_one,
     steps_down,
 )
+from parapoint.planar.unrolling import unrolled
 from parapoint.surfaces.cutting import cut_along, edge_lengths, origin, path_edges
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, compact
 
@@ -78,11 +79,15 @@ class Run:
         return clock.worked() > self.deadline
 
     def begin(self) -> None:
-        """Start from Tutte's embedding.
+        """Start from the surface unrolled, or from Tutte's embedding of one that does not unroll.
 
         Raises:
-            FlatteningError: it is too flat for numbers.
+            FlatteningError: the embedding is too flat for numbers.
         """
+        flat = unrolled(self.mesh)
+        if flat is not None:
+            self.take(flat, "unrolled")
+            return
         try:
             _, uv = embedded(self.mesh)
         except BijectionError as error:

@@ -35,6 +35,12 @@ LARGE = 1e4
 """The side of the map on which libigl works: its line search takes a change of area of less than
 1e-10 for none, and would turn over the small faces of a map of side 1."""
 
+LONGEST_BOX = 4.0
+"""How many times as long as wide the box around a map may be. libigl puts a frame around three such
+boxes: beside a long one it has few and long edges close to the map, and the space between is filled
+with ever smaller triangles. They hold up the map, and beside a ribbon of 2,000 faces took all of a
+machine's memory."""
+
 
 def of_area_one(vertices: FloatArray, faces: IntArray) -> Mesh:
     """The mesh scaled to an area of 1; a mesh without area stays as it is."""
@@ -127,6 +133,22 @@ def steps_down(
     most: int = MOST_STEPS,
 ) -> Iterator[FloatArray]:
     """The maps (V, 2) after each of at most `most` steps; none after one that fails."""
+    state, turn = None, np.eye(2)
+    for _ in range(most):
+        if clock.worked() > deadline:
+            return
+        is_long = _is_long(uv @ turn)
+        turn = _to_diagonal(uv) if is_long else turn
+        if state is None or is_long:
+            state = _begun(mesh, uv @ turn, energy)
+        uv = np.array(triangle.scaf_solve(1, state)[:, :2]) @ turn.T / LARGE
+        if not (signed_areas(uv, mesh.faces) > 0).all():  # nor if not a number
+            return
+        yield uv
+
+
+def _begun(mesh: Mesh, uv: FloatArray, energy: igl.MappingEnergyType) -> triangle.SCAFData:
+    """The descent before its first step."""
     state = triangle.SCAFData()
     triangle.scaf_precompute(
         np.asfortranarray(LARGE * mesh.vertices),
@@ -138,13 +160,21 @@ def steps_down(
         0.0,
         state,
     )
-    for _ in range(most):
-        if clock.worked() > deadline:
-            return
-        moved = np.array(triangle.scaf_solve(1, state)[:, :2]) / LARGE
-        if not (signed_areas(moved, mesh.faces) > 0).all():  # nor if not a number
-            return
-        yield moved
+    return state
+
+
+def _is_long(uv: FloatArray) -> bool:
+    """Whether the box around a map (V, 2) leaves its frame too near."""
+    sides = np.ptp(uv, axis=0)
+    return bool(sides.max() > LONGEST_BOX * sides.min())
+
+
+def _to_diagonal(uv: FloatArray) -> FloatArray:
+    """(2, 2) the turn that lays the longest way of a map (V, 2) along the diagonal of its box."""
+    _, _, axes = np.linalg.svd(uv - uv.mean(axis=0), full_matrices=False)
+    x, y = axes[0]
+    cos, sin = np.array([x + y, x - y]) / math.sqrt(2)
+    return np.array([[cos, sin], [-sin, cos]])
 
 
 def free_steps_down(

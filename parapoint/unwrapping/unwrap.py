@@ -65,7 +65,8 @@ class Begun:
 class Unwrap:
     """An isometric map of the mesh, cut along a clean path of edges; no flips, one to one.
 
-    The symmetric Dirichlet energy is brought down from Tutte's embedding; the boundary never
+    The symmetric Dirichlet energy is brought down from Tutte's embedding, or from the surface
+    unrolled where that needs no distortion (`parapoint.planar.unrolling`); the boundary never
     crosses itself (`parapoint.planar.scaffold`). Then the seam grows to where the map is most
     distorted (`parapoint.planar.growth`), as long as that pays, or until a bound on the energy is
     met, and on until hardly a place is starved of area.

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from benchmarks.cases import builtin
 from parapoint.planar import scaffold
-from parapoint.planar.bijection import is_bijective
+from parapoint.planar.bijection import embedded, is_bijective
 from parapoint.planar.scaffold import (
     cut_opened,
     descended,
@@ -106,3 +106,17 @@ def test_a_cut_has_twenty_steps_to_open_before_they_must_gain(monkeypatch, fall,
     monkeypatch.setattr(scaffold, "steps_down", down)
     monkeypatch.setattr(scaffold, "excess", lambda *_: next(falls))
     assert_array_equal(cut_opened(mesh, uv, igl.CONFORMAL), uv + steps)
+
+
+@pytest.mark.parametrize("degrees", [0, 30, 45, 120])
+def test_a_long_map_is_not_held_up_by_what_is_around_it(degrees: float) -> None:
+    columns = 100
+    x = np.arange(columns + 1.0)
+    vertices = np.concatenate([np.stack([x, y + 0 * x, 0 * x], 1) for y in (0, 1)])
+    strip = of_area_one(vertices, builtin.grid_faces(2, columns + 1))
+    _, disk = embedded(strip)
+    angle = np.radians(degrees)
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    uv = descended(strip, disk @ turn, igl.SYMMETRIC_DIRICHLET)
+    assert is_bijective(strip, uv)
+    assert excess(strip, uv, igl.SYMMETRIC_DIRICHLET) < 1e-4

@@ -251,3 +251,47 @@ def test_seams_of_an_older_map_are_not_left_in_the_mesh(split, apart) -> None:
     now, before = (evaluate(mesh, of) for mesh, of in ((doubled, found), (ball, closed)))
     for name in ("seam_length", "symmetric_dirichlet", "chart_count", "bijective"):
         assert now[name] == pytest.approx(before[name], rel=1e-3), name
+
+
+def _band(axis: np.ndarray, across: np.ndarray, widths: np.ndarray, *, closed: bool) -> Mesh:
+    """A ribbon along an axis (n, 3), on either side of it; the last line of points is the first."""
+    lines = axis[:, None] + widths[:, None] * across[:, None]
+    mesh = Mesh(lines.reshape(-1, 3), builtin.grid_faces(len(axis), len(widths)))
+    return mesh.welded if closed else mesh
+
+
+def _twisted() -> Mesh:
+    x = np.linspace(0, 150, 201)
+    across = np.stack([0 * x, np.cos(0.2 * x), np.sin(0.2 * x)], 1)
+    return _band(np.stack([x, 0 * x, 0 * x], 1), across, np.linspace(-1, 1, 4), closed=False)
+
+
+def _one_sided() -> Mesh:
+    """A long strip of Moebius."""
+    angle = np.linspace(0, 2 * np.pi, 301)
+    out = np.stack([np.cos(angle), np.sin(angle), 0 * angle], 1)
+    across = np.cos(angle / 2)[:, None] * out + np.sin(angle / 2)[:, None] * [0, 0, 1]
+    axis, across = 30 * out, np.where(abs(across) < 1e-15, 0, across)
+    axis[-1], across[-1] = axis[0], -across[0]
+    return _band(axis, across, np.array([-1.0, 0, 1]), closed=True)
+
+
+def _coil() -> Mesh:
+    """A wire of six sides, wound like a spring, open at both ends."""
+    angle = np.linspace(0, 2 * np.pi * 4, 161)
+    out = np.stack([np.cos(angle), np.sin(angle), 0 * angle], 1)
+    axis = 10 * out + np.stack([0 * angle, 0 * angle, 0.6 * angle], 1)
+    side = np.linspace(0, 2 * np.pi, 7)[:-1]
+    ring = np.cos(side)[:, None] * out[:, None] + np.sin(side)[:, None] * [0, 0, 1]
+    rows = np.arange(len(axis) * 6).reshape(-1, 6)[:, [*range(6), 0]]
+    faces = rows.reshape(-1)[builtin.grid_faces(len(axis), 7)]
+    return Mesh((axis[:, None] + ring).reshape(-1, 3), faces)
+
+
+@pytest.mark.parametrize("shape", [_twisted, _one_sided, _coil])
+def test_long_and_thin_surfaces_are_hardly_distorted_anywhere(shape) -> None:
+    mesh = shape()
+    found = evaluate(mesh, Unwrap().unwrapped(mesh))
+    assert found["flipped_fraction"] == found["overlap_area"] == 0
+    assert found["symmetric_dirichlet"] == pytest.approx(4, abs=0.03)
+    assert found["angle_difference_max"] < 0.2
