@@ -5,6 +5,11 @@ import pytest
 from parapoint.files import decoding
 
 
+def pytest_collection_modifyitems(items):
+    """Begin with the tests that are marked as long."""
+    items.sort(key=lambda item: item.get_closest_marker("long") is None)
+
+
 @pytest.fixture(autouse=True, scope="session")
 def nothing_is_installed():
     """Keep pip from the network, also in the processes that tests start: environments of methods

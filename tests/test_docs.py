@@ -60,6 +60,7 @@ def test_the_snippets_of_contributing_run(tmp_path, monkeypatch) -> None:
     np.testing.assert_array_equal(cloud.points, [[0, 0, 0], [1, 2, 3]])
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::RuntimeWarning")
 def test_the_tutorial_runs(tmp_path) -> None:
     notebook = nbformat.read(DOCS / "TUTORIAL.ipynb", as_version=4)

@@ -44,6 +44,7 @@ def method(name):
     return registry.method(f"{name}({spec})")[1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", sorted(registry.METHODS.keys() - {"meshlab_voronoi"}))
 def test_registered_method_conforms(name):
     try:

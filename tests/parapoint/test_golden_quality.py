@@ -89,6 +89,7 @@ def test_all_presets_have_golden_losses():
     assert set(PRESETS) <= set(RUNS)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("preset", "case", "bounds"),
     # Three seeds gave totals of 0.093 to 0.111 and angles of 0.33 to 0.58 of "paper", totals of

@@ -29,6 +29,7 @@ print(endurance.toll(suite, folder, count=2, seed=1))
 """
 
 
+@pytest.mark.long
 def test_runs_that_are_killed_end_in_the_table_of_one_that_was_not(tmp_path):
     # In a process of its own: it forks, which a test runner with threads must not.
     command = [sys.executable, "-c", KILLS, str(tmp_path)]
@@ -62,6 +63,7 @@ def test_a_row_that_is_lost_or_damaged_is_a_fault(tmp_path, capsys):
     assert found.faults == 2
 
 
+@pytest.mark.long
 def test_methods_that_go_wrong_cost_their_own_cells(tmp_path, monkeypatch, capsys):
     faults = {name: faulty.FAULTS[name] for name in ("segfault", "breed", "kill_the_supervisor")}
     monkeypatch.setattr(faulty, "FAULTS", faults)
@@ -72,6 +74,7 @@ def test_methods_that_go_wrong_cost_their_own_cells(tmp_path, monkeypatch, capsy
     assert "in place of timeout" in capsys.readouterr().out
 
 
+@pytest.mark.long
 def test_commands_leave_the_files_of_the_user(tmp_path):
     found = bystanders.undisturbed(tmp_path / "folder", count=2, seed=3)
     assert found.faults == []

@@ -132,6 +132,7 @@ class Killer(runner.Progress):
                 return
 
 
+@pytest.mark.long
 def test_a_run_on_two_workers_one_of_which_dies_gives_the_rows_of_a_local_one(
     tmp_path, slow, scheduler
 ):

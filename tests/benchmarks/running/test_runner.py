@@ -511,6 +511,7 @@ ALIKE = {"atlasnet", "diffsr", "elestruc", "gtif", "tearingnet", "reggeonet"}
 conformance suite holds that each repeats its map."""
 
 
+@pytest.mark.long
 def test_every_method_gives_the_same_map_in_two_cells_or_says_that_it_does_not(
     tmp_path, monkeypatch
 ):

@@ -19,6 +19,7 @@ from .test_executors import wait_until
 pytest.importorskip("distributed")
 
 
+@pytest.mark.long
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl makes the certificates")
 def test_a_run_over_tls_gives_the_rows_of_a_local_one(tmp_path: Path) -> None:
     """As docs/SCALE.md says; who has no certificate is not let in."""
