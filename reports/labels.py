@@ -53,6 +53,7 @@ DISPLAY: dict[str, tuple[str, str]] = {
     "erickson_har_peled": ("Erickson and Har-Peled + SLIM", "shortest cut"),
     "automatic+slim": ("Automatic cut + SLIM", ""),
     "unwrap": ("Unwrap", "symmetric Dirichlet, one to one"),
+    "unwrap(price=None)": ("Unwrap along the computed seam", "symmetric Dirichlet, one to one"),
     "parapoint+slim": ("Unwrap", "symmetric Dirichlet, one to one"),
     "computed": ("Computed map", ""),
     "parapoint(preset=learned)": ("ParaPoint, our training", ""),
@@ -169,8 +170,8 @@ def _in_print(method: str, params: Mapping[str, Any], submitted: str | None) -> 
     """The name in print, and what stands in its detail whatever the parameters are."""
     if submitted is not None:
         return submitted, "submitted maps"
-    preset = f"{method}(preset={params.get('preset')})"
-    return DISPLAY.get(preset, DISPLAY.get(method, (method, "")))
+    variants = [f"{method}({name}={value})" for name, value in params.items()]
+    return next((DISPLAY[one] for one in (*variants, method) if one in DISPLAY), (method, ""))
 
 
 def labels(rows: Iterable[ResultRow]) -> dict[tuple[str, str], Label]:

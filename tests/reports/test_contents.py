@@ -74,6 +74,24 @@ def test_variants_are_told_by_their_change_and_the_default_by_its_report(tmp_pat
     ]
 
 
+def test_a_variant_with_a_name_of_its_own_leaves_the_bare_name_to_the_default(tmp_path):
+    found = labels(
+        rows(
+            tmp_path,
+            ("unwrap", {"price": 1.0}, {}),
+            ("unwrap", {"price": None}, {}),
+            ("parapoint", {"preset": "paper"}, {}),
+            ("parapoint", {"preset": "learned"}, {}),
+        )
+    )
+    assert [label.short for label in found.values()] == [
+        "Unwrap",
+        "Unwrap along the computed seam",
+        "ParaPoint",
+        "ParaPoint, our training",
+    ]
+
+
 def test_names_that_are_taken_are_numbered(tmp_path):
     found = labels(
         rows(
