@@ -18,7 +18,7 @@ from parapoint.planar.scaffold import (
     of_area_one,
     steps_down,
 )
-from parapoint.planar.unrolling import unrolled
+from parapoint.planar.unrolling import conformal_layout, unrolls
 from parapoint.surfaces.cutting import cut_along, edge_lengths, origin, path_edges
 from parapoint.surfaces.surface import FloatArray, IntArray, Mesh, compact
 
@@ -81,17 +81,22 @@ class Run:
     def begin(self) -> None:
         """Start from the surface unrolled, or from Tutte's embedding of one that does not unroll.
 
+        Where the embedding is too flat for numbers, the conformal layout is the start.
+
         Raises:
-            FlatteningError: the embedding is too flat for numbers.
+            FlatteningError: that layout is not one to one.
         """
-        flat = unrolled(self.mesh)
-        if flat is not None:
+        flat = conformal_layout(self.mesh)
+        if flat is not None and unrolls(self.mesh, flat):
             self.take(flat, "unrolled")
             return
         try:
             _, uv = embedded(self.mesh)
         except BijectionError as error:
-            raise FlatteningError(f"no start without flips was found: {error}") from None
+            if flat is None:
+                raise FlatteningError(f"no start without flips was found: {error}") from None
+            self.take(flat, "conformal")
+            return
         self.take(self.unit * uv, "embedded")
 
     def take(self, uv: FloatArray, start: str) -> None:

@@ -1,4 +1,4 @@
-"""The flat layout of a surface that unrolls without distortion, as a ribbon or a pipe cut open."""
+"""The conformal layout of a planar domain, exact where the surface unrolls, as a ribbon does."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ MOST_EXCESS = 1e-3
 unrolls: its lengths are off by 2 % or so."""
 
 
-def unrolled(mesh: Mesh) -> FloatArray | None:
-    """(V, 2) the flat layout of a planar domain, of its area; None unless it unrolls, one to one.
+def conformal_layout(mesh: Mesh) -> FloatArray | None:
+    """(V, 2) the least-squares conformal map of a planar domain, of its area, if it is one to one.
 
-    The least-squares conformal map (B. Levy et al. 2002) of such a surface keeps lengths, too. From
-    Tutte's embedding it is dozens of steps away where the surface is long, and these may end first.
+    B. Levy et al. 2002, "Least squares conformal maps for automatic texture atlas generation", as
+    libigl solves it. None where it has no solution, or covers itself.
 
     Args:
         mesh: the domain, faces counter-clockwise, all its vertices referenced.
@@ -28,11 +28,22 @@ def unrolled(mesh: Mesh) -> FloatArray | None:
     unit = of_area_one(mesh.vertices, mesh.faces)
     loop = unit.boundary_loops[0]
     pins = loop[list(far_pair(unit.vertices[loop]))]
-    uv, _ = igl.lscm(unit.vertices, unit.faces, pins, np.array([[0.0, 0.0], [1.0, 0.0]]))
+    try:
+        uv, _ = igl.lscm(unit.vertices, unit.faces, pins, np.array([[0.0, 0.0], [1.0, 0.0]]))
+    except RuntimeError:  # faces too thin for numbers
+        return None
     area = signed_areas(uv, unit.faces).sum()
-    if not area > 0:  # nor if not a number
+    if not (area > 0 and is_bijective(unit, uv)):  # nor if not a number
         return None
-    uv = np.asarray(uv / np.sqrt(area))
-    if not (is_bijective(unit, uv) and excess(unit, uv, igl.SYMMETRIC_DIRICHLET) < MOST_EXCESS):
-        return None
-    return np.asarray(uv * np.sqrt(mesh.face_areas.sum()))
+    return np.asarray(uv * np.sqrt(mesh.face_areas.sum() / area))
+
+
+def unrolls(mesh: Mesh, uv: FloatArray) -> bool:
+    """Whether a layout (V, 2) of a surface, of its area, has its lengths (MOST_EXCESS).
+
+    From Tutte's embedding it is dozens of steps away where the surface is long, and these may end
+    before they are there.
+    """
+    unit = of_area_one(mesh.vertices, mesh.faces)
+    flat = uv / np.sqrt(mesh.face_areas.sum())
+    return excess(unit, flat, igl.SYMMETRIC_DIRICHLET) < MOST_EXCESS

@@ -28,6 +28,7 @@ from parapoint.planar.scaffold import of_area_one
 from parapoint.surfaces.across_seams import learned_seam
 from parapoint.surfaces.areas import LEAST_PART
 from parapoint.surfaces.cutting import cut_along, disk_cut
+from parapoint.surfaces.lids import lid_cut
 from parapoint.surfaces.parameterization import Parameterization
 from parapoint.surfaces.preparation import LEAST_TIME, prepared
 from parapoint.surfaces.sampling import FEWEST_VERTICES
@@ -65,19 +66,20 @@ class Begun:
 class Unwrap:
     """An isometric map of the mesh, cut along a clean path of edges; no flips, one to one.
 
-    The symmetric Dirichlet energy is brought down from Tutte's embedding, or from the surface
-    unrolled where that needs no distortion (`parapoint.planar.unrolling`); the boundary never
-    crosses itself (`parapoint.planar.scaffold`). Then the seam grows to where the map is most
-    distorted (`parapoint.planar.growth`), as long as that pays, or until a bound on the energy is
-    met, and on until hardly a place is starved of area.
+    The symmetric Dirichlet energy is brought down from Tutte's embedding, or from the conformal
+    layout of a surface that unrolls (`parapoint.planar.unrolling`); the boundary never crosses
+    itself (`parapoint.planar.scaffold`). Then the seam grows to where the map is most distorted
+    (`parapoint.planar.growth`), as long as that pays, or until a bound on the energy is met, and on
+    until hardly a place is starved of area.
 
     A mesh is begun along the least cut, none for a disk, with or without holes, and the automatic
     one (`parapoint.surfaces.cutting`) for others; along cuts from rim to rim, if it is a disk with
-    holes; and along the seam of the computed map of its faces (`parapoint.computed.faces`), or of
-    points of it where these are slender, made a clean path of edges
-    (`parapoint.surfaces.across_seams`). The best map stays, by its energy and the price of its
-    seam: which start leads to it cannot be told before. Where the map must come below a bound on
-    the energy, it is begun along the map of points, too, and the shortest stays.
+    holes; around a large side between creases, if it has one (`parapoint.surfaces.lids`); and along
+    the seam of the computed map of its faces (`parapoint.computed.faces`), or of points of it where
+    these are slender, made a clean path of edges (`parapoint.surfaces.across_seams`). The best map
+    stays, by its energy and the price of its seam: which start leads to it cannot be told before.
+    Where the map must come below a bound on the energy, it is begun along the map of points, too,
+    and the shortest stays.
     Of a large mesh a simplified one tells which start is the better, and where the seam grows to
     (`parapoint.planar.coarse`), but under a bound, as the two differ in energy.
     Components are mapped one after another.
@@ -233,12 +235,19 @@ class Unwrap:
         def along_points(until: float) -> tuple[BoolArray, dict[str, object]]:
             return _seam(mesh, partial(_map_of_points, mesh, seed), until)
 
+        lid = lid_cut(mesh)
+
+        def around_lid(_: float) -> tuple[BoolArray, dict[str, object]]:
+            assert lid is not None
+            return lid, {"not_asked": "the map begins with a side opened like a lid"}
+
         along_map = along_faces if is_even(mesh) else along_points
         if not self._grows:
             return [along_map]
         is_bounded = self.max_distortion is not None
         has_rims = mesh.is_planar_domain and len(mesh.boundary_loops) > 1
-        starts = [least, *[across_rims] * has_rims, along_map, *[along_points] * is_bounded]
+        by_shape = [*[across_rims] * has_rims, *[around_lid] * (lid is not None)]
+        starts = [least, *by_shape, along_map, *[along_points] * is_bounded]
         return list(dict.fromkeys(starts))
 
     def _cost(self, run: Run) -> tuple[bool, float]:
@@ -255,9 +264,9 @@ class Unwrap:
             FlatteningError: it has no map without flips.
         """
         seam, told = start(deadline)
-        domain = embeddable(cut_along(mesh, mesh.edges[seam]))
+        domain = cut_along(mesh, mesh.edges[seam])
         if self._is_led(mesh):
-            guess = led(domain, self._need, deadline)
+            guess = led(embeddable(domain), self._need, deadline)
             if guess is not None:
                 return Begun(seam, told, guess.run, guess)
         run = _settled(domain, (), deadline)
@@ -273,7 +282,7 @@ class Unwrap:
         """
         if begun.led is None:
             return begun
-        run = _settled(embeddable(begun.led.domain), begun.led.tips, deadline)
+        run = _settled(begun.led.domain, begun.led.tips, deadline)
         if self._need.of(run):
             run = grown(run, self._need)
         return Begun(begun.seam, begun.told, run, None)
@@ -298,11 +307,31 @@ def _settled(domain: Mesh, tips: tuple[int, ...], deadline: float) -> Run:
     Raises:
         FlatteningError: it has no map without flips.
     """
-    run = Run(domain, deadline)
+    run = _started(domain, deadline)
     run.tips = tips
-    run.begin()
     run.improve()
     return run
+
+
+def _started(domain: Mesh, deadline: float) -> Run:
+    """The map that a descent begins with: of the domain, or of one that gives Tutte's more room.
+
+    Raises:
+        FlatteningError: neither has a map without flips.
+    """
+    found: list[Run] = []
+    fault = FlatteningError("no start without flips was found")
+    for mesh in dict.fromkeys([domain, embeddable(domain)]):
+        run = Run(mesh, deadline)
+        try:
+            run.begin()
+        except FlatteningError as error:
+            fault = error
+            continue
+        found.append(run)
+    if not found:
+        raise fault
+    return min(found, key=lambda run: run.energy)
 
 
 def _seam(

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from benchmarks.cases import builtin
 from parapoint.planar.bijection import is_bijective
 from parapoint.planar.descent import Run, sound
-from parapoint.planar.unrolling import unrolled
+from parapoint.planar.unrolling import conformal_layout, unrolls
 from parapoint.surfaces.cutting import edge_lengths
 from parapoint.surfaces.surface import Mesh
 
@@ -59,9 +59,10 @@ UNROLLED = {
 @pytest.mark.parametrize("name", UNROLLED)
 def test_a_surface_unrolls_to_its_own_lengths(name: str) -> None:
     mesh = UNROLLED[name]
-    flat = unrolled(mesh)
+    flat = conformal_layout(mesh)
     assert flat is not None
     assert is_bijective(mesh, flat)
+    assert unrolls(mesh, flat)
     laid = Mesh(np.pad(flat, ((0, 0), (0, 1))), mesh.faces)
     assert_allclose(edge_lengths(laid), edge_lengths(mesh), rtol=2e-3)
 
@@ -77,7 +78,8 @@ def test_a_surface_unrolls_to_its_own_lengths(name: str) -> None:
     ids=["cap", "saddle", "cone", "two turns"],
 )
 def test_other_surfaces_do_not_unroll(mesh: Mesh) -> None:
-    assert unrolled(mesh) is None
+    flat = conformal_layout(mesh)
+    assert flat is None or not unrolls(mesh, flat)
 
 
 def test_a_run_begins_with_the_surface_unrolled() -> None:

@@ -1,0 +1,49 @@
+"""The lid of a surface: a large side between creases, such as that of a plate or a box."""
+
+from __future__ import annotations
+
+import igl
+import numpy as np
+
+from parapoint.surfaces.cutting import cut_along, disk_cut, edge_lengths, edge_mask, origin
+from parapoint.surfaces.surface import BoolArray, Mesh, edge_components
+
+CREASE = np.radians(30)
+"""Angle between the normals of two faces, in radians, above which their edge is a crease."""
+SMALLEST_LID, LARGEST_LID = 0.1, 0.5
+"""Share of the surface that a lid has. To open a smaller side helps little; around a larger one it
+is the rest that would have to be opened."""
+ALIKE = 1e-6
+"""Share of the longest length by which an edge may be shorter and still count as the longest."""
+
+
+def lid_cut(mesh: Mesh) -> BoolArray | None:
+    """(E,) the edges along which a mesh opens around its lid, its largest side; None without one.
+
+    The lid stays joined to each part of the rest by the longest edge between the two. Where this is
+    no planar domain yet, it is cut on (`parapoint.surfaces.cutting.disk_cut`).
+
+    Args:
+        mesh: connected, manifold, consistently oriented.
+    """
+    creases = igl.sharp_edges(mesh.vertices, mesh.faces, CREASE)
+    side = edge_components(cut_along(mesh, creases).faces)
+    share = np.bincount(side, mesh.face_areas) / mesh.face_areas.sum()
+    lid = int(np.where(share > LARGEST_LID, 0, share).argmax())
+    if not SMALLEST_LID <= share[lid] <= LARGEST_LID:
+        return None
+    is_between = np.bincount(mesh.edge_of_halfedge, np.repeat(side == lid, 3)) == 1
+    rim = is_between & (mesh.edge_face_count == 2)
+    part = edge_components(cut_along(mesh, mesh.edges[rim]).faces)
+    beside = np.bincount(mesh.edge_of_halfedge, np.repeat(part, 3)) - part[side == lid][0]
+    lengths = edge_lengths(mesh)
+    cut = rim.copy()
+    for other in np.unique(beside[rim]):
+        shared = np.flatnonzero(rim & (beside == other))
+        longest = lengths[shared] > (1 - ALIKE) * lengths[shared].max()
+        cut[shared[longest.argmax()]] = False
+    opened = cut_along(mesh, mesh.edges[cut])
+    if not opened.is_planar_domain:
+        more = opened.edges[disk_cut(opened)]
+        cut |= edge_mask(mesh, origin(mesh, opened)[more])
+    return cut
