@@ -46,4 +46,4 @@ def lid_cut(mesh: Mesh) -> BoolArray | None:
     if not opened.is_planar_domain:
         more = opened.edges[disk_cut(opened)]
         cut |= edge_mask(mesh, origin(mesh, opened)[more])
-    return cut
+    return np.asarray(cut, dtype=bool)
