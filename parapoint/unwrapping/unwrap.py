@@ -246,8 +246,8 @@ class Unwrap:
             return [along_map]
         is_bounded = self.max_distortion is not None
         has_rims = mesh.is_planar_domain and len(mesh.boundary_loops) > 1
-        by_shape = [*[across_rims] * has_rims, *[around_lid] * (lid is not None)]
-        starts = [least, *by_shape, along_map, *[along_points] * is_bounded]
+        first = [*[around_lid] * (lid is not None), least, *[across_rims] * has_rims]
+        starts = [*first, along_map, *[along_points] * is_bounded]
         return list(dict.fromkeys(starts))
 
     def _cost(self, run: Run) -> tuple[bool, float]:
