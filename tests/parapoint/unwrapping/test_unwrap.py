@@ -300,12 +300,12 @@ def test_long_and_thin_surfaces_are_hardly_distorted_anywhere(shape) -> None:
 
 
 def test_a_thin_plate_with_holes_is_opened_around_one_side_at_first(runs) -> None:
-    outline = shapely.Point(0, 0).buffer(10, 8)
+    outline = shapely.Point(0, 0).buffer(10, 4)
     for x in (-5, 5):
-        outline = outline.difference(shapely.Point(x, 0).buffer(1, 4))
+        outline = outline.difference(shapely.Point(x, 0).buffer(1, 2))
     plate = trimesh.creation.extrude_polygon(outline, 0.01)
     mesh = Mesh(plate.vertices, plate.faces)
     found = evaluate(mesh, Unwrap().unwrapped(mesh))
     assert found["flipped_fraction"] == found["overlap_area"] == found["starved_area_fraction"] == 0
-    assert found["symmetric_dirichlet"] < 4.1  # 4.46 along the other seams
+    assert found["symmetric_dirichlet"] < 4.1  # 4.36 along the least cut
     assert runs[0].energy < 4.1  # so that little time is enough
