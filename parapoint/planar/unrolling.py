@@ -41,8 +41,8 @@ def conformal_layout(mesh: Mesh) -> FloatArray | None:
 def unrolls(mesh: Mesh, uv: FloatArray) -> bool:
     """Whether a layout (V, 2) of a surface, of its area, has its lengths (MOST_EXCESS).
 
-    From Tutte's embedding it is dozens of steps away where the surface is long, and these may end
-    before they are there.
+    A descent from Tutte's embedding takes dozens of steps to such a layout where the surface is
+    long, and may end before it is there.
     """
     unit = of_area_one(mesh.vertices, mesh.faces)
     flat = uv / np.sqrt(mesh.face_areas.sum())

@@ -78,3 +78,11 @@ def test_the_lid_is_the_same_wherever_the_surface_lies(shift: float, scale: floa
         moved = similar(mesh, shift, scale)
         assert isinstance(moved, Mesh)
         np.testing.assert_array_equal(lid_cut(moved), lid_cut(mesh))
+
+
+@pytest.mark.parametrize("degrees", [1, 30, 77])
+def test_which_of_two_equal_sides_opens_does_not_depend_on_how_the_surface_lies(degrees) -> None:
+    turn = trimesh.transformations.rotation_matrix(np.radians(degrees), [1, 2, 3])[:3, :3]
+    for mesh in (plate(2, 0.5), plate(0, 0.01)):
+        turned = Mesh(mesh.vertices @ turn.T, mesh.faces)
+        np.testing.assert_array_equal(lid_cut(turned), lid_cut(mesh))
