@@ -34,12 +34,11 @@ no triangle turns over."""
 LARGE = 1e4
 """The side of the map on which libigl works: its line search takes a change of area of less than
 1e-10 for none, and would turn over the small faces of a map of side 1."""
-
 LONGEST_BOX = 4.0
-"""How many times as long as wide the box around a map may be. libigl puts a frame around three such
-boxes: beside a long one it has few and long edges close to the map, and the space between is filled
-with ever smaller triangles. They hold up the map, and beside a ribbon of 2,000 faces took all of a
-machine's memory."""
+"""How many times as long as wide the box around a map may be. libigl puts a frame around it, three
+times as large: that of a long box has few and long edges close to the map, and the space between is
+filled with ever smaller triangles. They hold up the map, and beside a ribbon of 2,000 faces took
+all of a machine's memory."""
 
 
 def of_area_one(vertices: FloatArray, faces: IntArray) -> Mesh:

@@ -7,13 +7,9 @@ import numpy as np
 
 from parapoint.planar.bijection import is_bijective
 from parapoint.planar.domains import far_pair
-from parapoint.planar.scaffold import excess, of_area_one
+from parapoint.planar.scaffold import of_area_one
 from parapoint.surfaces.areas import signed_areas
 from parapoint.surfaces.surface import FloatArray, Mesh
-
-MOST_EXCESS = 1e-3
-"""Excess of the symmetric Dirichlet energy, in units of its least value, below which a surface
-unrolls: its lengths are off by 2 % or so."""
 
 
 def conformal_layout(mesh: Mesh) -> FloatArray | None:
@@ -36,14 +32,3 @@ def conformal_layout(mesh: Mesh) -> FloatArray | None:
     if not (area > 0 and is_bijective(unit, uv)):  # nor if not a number
         return None
     return np.asarray(uv * np.sqrt(mesh.face_areas.sum() / area))
-
-
-def unrolls(mesh: Mesh, uv: FloatArray) -> bool:
-    """Whether a layout (V, 2) of a surface, of its area, has its lengths (MOST_EXCESS).
-
-    A descent from Tutte's embedding takes dozens of steps to such a layout where the surface is
-    long, and may end before it is there.
-    """
-    unit = of_area_one(mesh.vertices, mesh.faces)
-    flat = uv / np.sqrt(mesh.face_areas.sum())
-    return excess(unit, flat, igl.SYMMETRIC_DIRICHLET) < MOST_EXCESS

@@ -18,8 +18,8 @@ ALIKE = 1e-6
 rounding decides nothing; and so for the lengths of edges."""
 
 
-def lid_cut(mesh: Mesh) -> BoolArray | None:
-    """(E,) the edges along which a mesh opens around its lid, its largest side; None without one.
+def lid_cut(mesh: Mesh) -> BoolArray:
+    """(E,) the edges along which a mesh opens around its lid, its largest side; none without a lid.
 
     The lid stays joined to each part of the rest by the longest edge between the two. Where this is
     no planar domain yet, it is cut on (`parapoint.surfaces.cutting.disk_cut`).
@@ -33,7 +33,7 @@ def lid_cut(mesh: Mesh) -> BoolArray | None:
     share[share > LARGEST_LID] = 0
     lid = _largest(share)
     if share[lid] < SMALLEST_LID:
-        return None
+        return np.zeros(len(mesh.edges), dtype=bool)
     is_between = np.bincount(mesh.edge_of_halfedge, np.repeat(side == lid, 3)) == 1
     rim = is_between & (mesh.edge_face_count == 2)
     part = edge_components(cut_along(mesh, mesh.edges[rim]).faces)

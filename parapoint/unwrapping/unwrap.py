@@ -235,18 +235,17 @@ class Unwrap:
         def along_points(until: float) -> tuple[BoolArray, dict[str, object]]:
             return _seam(mesh, partial(_map_of_points, mesh, seed), until)
 
-        lid = lid_cut(mesh)
-
-        def around_lid(_: float) -> tuple[BoolArray, dict[str, object]]:
-            assert lid is not None
-            return lid, {"not_asked": "the map begins with a side opened like a lid"}
-
         along_map = along_faces if is_even(mesh) else along_points
         if not self._grows:
             return [along_map]
+        lid = lid_cut(mesh)
+
+        def around_lid(_: float) -> tuple[BoolArray, dict[str, object]]:
+            return lid, {"not_asked": "the map begins with a side opened like a lid"}
+
         is_bounded = self.max_distortion is not None
         has_rims = mesh.is_planar_domain and len(mesh.boundary_loops) > 1
-        first = [*[around_lid] * (lid is not None), least, *[across_rims] * has_rims]
+        first = [*[around_lid] * bool(lid.any()), least, *[across_rims] * has_rims]
         starts = [*first, along_map, *[along_points] * is_bounded]
         return list(dict.fromkeys(starts))
 

@@ -33,7 +33,6 @@ def test_a_plate_opens_around_one_of_its_sides(holes: int) -> None:
     mesh = plate(holes, 0.5)
     assert mesh.genus == holes
     cut = lid_cut(mesh)
-    assert cut is not None
     opened = cut_along(mesh, mesh.edges[cut])
     assert opened.is_planar_domain
     assert len(opened.boundary_loops) == 1 + 2 * holes
@@ -46,14 +45,12 @@ def test_a_plate_opens_around_one_of_its_sides(holes: int) -> None:
 def test_each_part_around_a_lid_stays_joined_by_its_longest_edge() -> None:
     mesh = drum(0.9)  # its wall is the largest side, and two caps fall off
     cut = lid_cut(mesh)
-    assert cut is not None
     assert cut.sum() == 2 * 39
     opened = cut_along(mesh, mesh.edges[cut])
     assert edge_components(opened.faces).max() == 0
     box = trimesh.creation.box((4, 3, 1))
     boxed = Mesh(box.vertices, box.faces)
     cut = lid_cut(boxed)
-    assert cut is not None
     np.testing.assert_allclose(np.sort(edge_lengths(boxed)[cut]), [3, 3, 4])
 
 
@@ -69,7 +66,7 @@ def test_each_part_around_a_lid_stays_joined_by_its_longest_edge() -> None:
     ids=["ball", "cap", "half a pipe", "rod", "ring"],
 )
 def test_surfaces_without_a_large_side_between_creases_have_no_lid(mesh: Mesh) -> None:
-    assert lid_cut(mesh) is None
+    assert not lid_cut(mesh).any()
 
 
 @pytest.mark.parametrize(("shift", "scale"), [(1e3, 1e-6), (-1e5, 1e6)])
